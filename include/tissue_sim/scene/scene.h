@@ -1,0 +1,72 @@
+#pragma once
+
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "tissue_sim/geometry/pose.h"
+#include "tissue_sim/geometry/triangle_mesh.h"
+
+namespace tissue_sim {
+
+enum class Model { contact_only, surface, volume, fem };
+enum class CollidingSet { flood, paper };  ///< how the vertices inside the instrument are found (doc/contact.md)
+enum class DepthScheme { exact, paper };   ///< closest point on the instrument, or Eq. 1-6
+
+/// SI units. What a model does not use may be left out of the scene file and is then zero here.
+struct Material {
+  double young = 0.0;    ///< Pa
+  double poisson = 0.0;  ///< 1
+  double density = 0.0;  ///< kg/m^3
+  double damping = 0.0;  ///< fraction of the critical damping of each element, along its own gradient (Teschner)
+  double drag = 0.0;     ///< 1/s, force per mass and velocity: the tissue around the organ
+};
+
+/// One organ as the scene describes it, with every file read: nothing here refers to a file any more.
+struct Organ {
+  std::string name;
+  TriangleMesh mesh;  ///< scene frame, metres; closed, manifold, outward
+  Model model = Model::surface;
+  bool restoration = true;  ///< false: plastic, what the instrument moved stays moved
+  CollidingSet colliding_set = CollidingSet::flood;
+  DepthScheme depth = DepthScheme::exact;
+  Material material;
+  double wall_thickness = 0.0;  ///< m, `surface` only
+  std::vector<int> attached;    ///< vertices held at their rest place, ascending
+};
+
+/// One rigid piece of an instrument: the collision shape of a URDF link.
+struct InstrumentPart {
+  std::string link;
+  TriangleMesh mesh;   ///< frame of the tip link, metres
+  bool closed = true;  ///< false: the source was open or non-manifold and could not be mended
+};
+
+/// A rigid instrument, joints at zero.
+struct Instrument {
+  std::string name;
+  std::string tip_link;
+  std::string pose_topic;
+  std::vector<InstrumentPart> parts;
+};
+
+struct Scene {
+  std::string frame;
+  Vector3 gravity = Vector3::Zero();  ///< m/s^2
+  double time_step = 0.001;           ///< s, the longest step
+  int max_substeps = 100;             ///< a scene that needs more for one step is refused
+  std::vector<Organ> organs;
+  std::vector<Instrument> instruments;
+};
+
+/// A scene that cannot be used. what() is one line: `file:line:column: key: what was wrong, what is allowed`.
+class SceneError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+const char* to_string(Model model);
+const char* to_string(CollidingSet set);
+const char* to_string(DepthScheme depth);
+
+}  // namespace tissue_sim

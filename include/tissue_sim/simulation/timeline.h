@@ -1,0 +1,115 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tissue_sim/contact/contact.h"
+#include "tissue_sim/geometry/pose.h"
+#include "tissue_sim/scene/scene.h"
+
+namespace tissue_sim {
+
+/// Pose of an instrument's tip link in the scene's frame.
+struct StampedPose {
+  std::int64_t stamp = 0;  ///< ns
+  Pose pose;
+};
+
+enum class PoseVerdict { used, zero_stamp, non_finite, zero_quaternion, stale, new_run };
+constexpr int pose_verdicts = 6;
+const char* to_string(PoseVerdict verdict);
+
+/// Force and torque about the tip, on the instrument, scene frame; N and N m.
+struct Wrench {
+  Vector3 force = Vector3::Zero();
+  Vector3 torque = Vector3::Zero();
+};
+
+/// Wall time of the stages of one step, s, summed over its substeps.
+struct StepProfile {
+  double refit = 0.0;        ///< trees of what moved
+  double detection = 0.0;    ///< stage 1
+  double penetration = 0.0;  ///< stage 2
+  double propagation = 0.0;  ///< stage 3
+  double response = 0.0;
+  double deformation = 0.0;  ///< elements, integration, restoration
+  double health = 0.0;
+  double total = 0.0;
+};
+
+/// What one step did. Valid until the next one.
+struct StepReport {
+  std::uint64_t step = 0;       ///< counts from 1; never goes back, not even at a reset
+  std::int64_t stamp = 0;       ///< ns, the simulated time that the states show
+  bool pose_reached = false;    ///< the step ended on the stamp of a pose
+  bool state_due = false;       ///< state_period has passed since the last state that was due
+  bool recovered = false;       ///< the health check put the last good state back
+  int substeps = 0;
+  std::vector<Contact> contacts;
+  std::vector<Wrench> wrenches;  ///< one an instrument
+  std::vector<Pose> poses;       ///< one an instrument, at `stamp`; meaningful where `placed`
+  std::vector<char> placed;      ///< one an instrument: it has been given a pose
+  StepProfile profile;
+};
+
+struct TimelineOptions {
+  std::int64_t state_period = 16'000'000;         ///< ns
+  std::int64_t time_jump_threshold = 500'000'000;  ///< ns
+  std::int64_t pose_timeout = 500'000'000;         ///< ns; an instrument this far behind the others is held, not waited for
+  bool newest_only = false;  ///< true: steps go to the newest pose and the ones before it are passed over
+};
+
+struct TimelineCounters {
+  std::array<std::uint64_t, pose_verdicts> poses{};  ///< by PoseVerdict
+  std::uint64_t poses_superseded = 0;                ///< passed over by newest_only
+  std::uint64_t normalised_quaternions = 0;
+  std::uint64_t recoveries = 0;                      ///< by the health check
+  std::uint64_t resets = 0;
+};
+
+/// What an organ shows. Arrays have one entry a vertex.
+struct OrganView {
+  const std::vector<Vector3>& positions;  ///< m, scene frame
+  const std::vector<double>& depths;      ///< m, 0 where the instrument does not press
+};
+
+/// Stamped poses in, steps out: the time rules of the simulation, shared by the node and the replay.
+///
+/// Time is that of the stamps, in whole nanoseconds. From one pose to the next the way is cut into equal
+/// steps no longer than the scene's time step, so that a step always ends on a pose's stamp.
+class Timeline {
+ public:
+  explicit Timeline(const Scene& scene, const TimelineOptions& options = {});
+  ~Timeline();
+
+  /// Takes a pose or says why not. A stamp that goes back by more than time_jump_threshold starts a new run:
+  /// organs at rest, poses forgotten, this pose the first.
+  PoseVerdict add_pose(int instrument, const StampedPose& pose);
+
+  /// Makes the next step if the poses given so far allow one. False: nothing to do until the next pose.
+  bool step();
+
+  /// Makes the next step towards `until` (ns) with the last poses held. False once `until` is reached.
+  bool step_holding(std::int64_t until);
+
+  /// Puts one organ, or all for -1, back to its rest shape.
+  void reset(int organ);
+
+  const StepReport& report() const;
+  OrganView organ(int index) const;
+  const TimelineCounters& counters() const;
+  std::uint64_t hash() const;  ///< of every state since construction, over positions, velocities and depths
+  std::int64_t now() const;    ///< ns, the stamp of the last step or of the first pose; 0 before that
+  double kinetic_energy() const;  ///< J
+  double elastic_energy() const;  ///< J
+  int active_vertices() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace tissue_sim
