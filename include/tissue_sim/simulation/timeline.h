@@ -76,12 +76,28 @@ struct OrganView {
   const std::vector<double>& depths;      ///< m, 0 where the instrument does not press
 };
 
+/// What will be modelled of one organ, and what it takes.
+struct OrganSummary {
+  int vertices = 0;
+  int triangles = 0;
+  int attached = 0;
+  int distance_elements = 0;
+  int area_elements = 0;
+  int volume_elements = 0;      ///< one a flap, and one for the whole organ
+  double mass = 0.0;            ///< kg
+  double added_mass = 0.0;      ///< kg, by the mass floor
+  double stable_substep = 0.0;  ///< s; 0 where nothing is integrated
+  int substeps = 1;             ///< in a step of the scene's time step, motion of the instruments aside
+};
+
 /// Stamped poses in, steps out: the time rules of the simulation, shared by the node and the replay.
 ///
 /// Time is that of the stamps, in whole nanoseconds. From one pose to the next the way is cut into equal
 /// steps no longer than the scene's time step, so that a step always ends on a pose's stamp.
 class Timeline {
  public:
+  /// Throws SceneError, which names the organ and the time step or stiffness that would do, when a step would need
+  /// more than the scene's max_substeps.
   explicit Timeline(const Scene& scene, const TimelineOptions& options = {});
   ~Timeline();
 
@@ -100,6 +116,7 @@ class Timeline {
 
   const StepReport& report() const;
   OrganView organ(int index) const;
+  OrganSummary summary(int organ) const;
   const TimelineCounters& counters() const;
   std::uint64_t hash() const;  ///< of every state since construction, over positions, velocities and depths
   std::int64_t now() const;    ///< ns, the stamp of the last step or of the first pose; 0 before that
