@@ -3,7 +3,7 @@
 #include <array>
 #include <vector>
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 
 namespace tissue_sim {
 

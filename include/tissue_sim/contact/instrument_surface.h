@@ -1,0 +1,35 @@
+#pragma once
+
+#include "tissue_sim/geometry/aabb_tree.h"
+#include "tissue_sim/geometry/closest_point.h"
+#include "tissue_sim/geometry/triangle_mesh.h"
+
+namespace tissue_sim {
+
+/// One rigid piece of an instrument, ready for contact. Everything is in the frame of the instrument's tip and is built
+/// once: organs are carried into this frame, so its tree never moves. Metres.
+struct InstrumentSurface {
+  std::vector<Vector3> vertices;
+  std::vector<Triangle> triangles;
+  MeshTopology topology;
+  std::vector<Vector3> normals;  ///< unit, one a triangle; zero where it is degenerate
+  AabbTree tree;
+  Box bounds;
+  double reach = 0.0;   ///< of its farthest point from the tip
+  bool closed = true;
+};
+
+InstrumentSurface build_instrument_surface(const TriangleMesh& mesh, bool closed);
+
+/// The closest point of an instrument's surface, and which side of it p is on.
+struct ClosestFeature {
+  Vector3 point;
+  Vector3 direction;  ///< unit, out of the instrument
+  double depth;       ///< m, positive inside
+};
+
+/// Exact depth and direction of p (tip frame). The sign is that of the pseudonormal at the closest feature; where p lies on
+/// the surface the direction is that normal.
+ClosestFeature closest_feature(const InstrumentSurface& surface, const Vector3& p);
+
+}  // namespace tissue_sim

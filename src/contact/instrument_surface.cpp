@@ -1,0 +1,47 @@
+#include "tissue_sim/contact/instrument_surface.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace tissue_sim {
+
+namespace {
+/// m; nearer to the surface than this, the way to the closest point is rounding and the surface's normal is used.
+constexpr double on_surface = 1e-9;
+}  // namespace
+
+InstrumentSurface build_instrument_surface(const TriangleMesh& mesh, bool closed) {
+  InstrumentSurface surface;
+  surface.vertices = mesh.vertices;
+  surface.triangles = mesh.triangles;
+  surface.topology = build_topology(static_cast<int>(mesh.vertices.size()), mesh.triangles);
+  surface.bounds = bounds_of(mesh.vertices);
+  surface.closed = closed;
+  for (const Vector3& v : mesh.vertices) surface.reach = std::max(surface.reach, v.norm());
+
+  std::vector<Box> boxes(mesh.triangles.size());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto& [a, b, c] = mesh.triangles[t];
+    for (const int v : {a, b, c}) boxes[t].add(mesh.vertices[v]);
+    surface.normals.push_back(area_normal(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]).stableNormalized());
+  }
+  surface.tree.build(boxes);
+  return surface;
+}
+
+ClosestFeature closest_feature(const InstrumentSurface& surface, const Vector3& p) {
+  const ClosestOnMesh closest =
+      closest_on_mesh(surface.vertices, surface.triangles, surface.tree, p, std::numeric_limits<double>::max());
+  const Vector3 normal =
+      pseudonormal(surface.vertices, surface.triangles, surface.topology, closest.triangle, closest.on.feature)
+          .stableNormalized();
+  const Vector3 way_out = closest.on.point - p;
+  const double distance = std::sqrt(closest.squared_distance);
+  const bool inside = way_out.dot(normal) > 0.0;
+  if (distance < on_surface) return {closest.on.point, normal, inside ? distance : -distance};
+  if (inside) return {closest.on.point, way_out / distance, distance};
+  return {closest.on.point, -way_out / distance, -distance};
+}
+
+}  // namespace tissue_sim
