@@ -31,15 +31,14 @@ HalfEdges sort_half_edges(int vertex_count, const std::vector<Triangle>& triangl
   sorted.first.assign(static_cast<std::size_t>(vertex_count) + 1, 0);
   sorted.sides.resize(3 * triangles.size());
   for (const Triangle& t : triangles) {
-    for (std::size_t i = 0; i < 3; ++i) ++sorted.first[static_cast<std::size_t>(std::min(t[i], t[(i + 1) % 3])) + 1];
+    for (std::size_t i = 0; i < 3; ++i) ++sorted.first[std::min(t[i], t[(i + 1) % 3]) + 1];
   }
   std::partial_sum(sorted.first.begin(), sorted.first.end(), sorted.first.begin());
   std::vector<int> next(sorted.first.begin(), sorted.first.end() - 1);
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     for (std::size_t i = 0; i < 3; ++i) {
       const auto [low, high] = std::minmax(triangles[t][i], triangles[t][(i + 1) % 3]);
-      sorted.sides[static_cast<std::size_t>(next[static_cast<std::size_t>(low)]++)] = {high,
-                                                                                       static_cast<int>(3 * t + i)};
+      sorted.sides[next[low]++] = {high, static_cast<int>(3 * t + i)};
     }
   }
   for (std::size_t v = 0; v + 1 < sorted.first.size(); ++v) {
@@ -70,14 +69,14 @@ FlatLists invert(int list_count, const Items& items) {
   FlatLists lists;
   lists.first.assign(static_cast<std::size_t>(list_count) + 1, 0);
   for (const auto& owners : items) {
-    for (const int owner : owners) ++lists.first[static_cast<std::size_t>(owner) + 1];
+    for (const int owner : owners) ++lists.first[owner + 1];
   }
   std::partial_sum(lists.first.begin(), lists.first.end(), lists.first.begin());
-  lists.items.resize(static_cast<std::size_t>(lists.first.back()));
+  lists.items.resize(lists.first.back());
   std::vector<int> next(lists.first.begin(), lists.first.end() - 1);
   for (std::size_t i = 0; i < items.size(); ++i) {
     for (const int owner : items[i]) {
-      lists.items[static_cast<std::size_t>(next[static_cast<std::size_t>(owner)]++)] = static_cast<int>(i);
+      lists.items[next[owner]++] = static_cast<int>(i);
     }
   }
   return lists;
@@ -90,14 +89,14 @@ struct DisjointSets {
   explicit DisjointSets(int count) : parent(static_cast<std::size_t>(count)) {
     std::iota(parent.begin(), parent.end(), 0);
   }
-  int& at(int i) { return parent[static_cast<std::size_t>(i)]; }
+  int& at(int i) { return parent[i]; }
   int root(int i) {
     while (at(i) != i) i = at(i) = at(at(i));
     return i;
   }
   void join(int a, int b) {
-    const auto [low, high] = std::minmax(root(a), root(b));
-    at(high) = low;
+    const std::pair<int, int> ends = std::minmax({root(a), root(b)});
+    at(ends.second) = ends.first;
   }
 };
 
@@ -106,7 +105,7 @@ bool has_repeated_corner(const Triangle& t) {
 }
 
 bool runs_low_to_high(const Triangle& t, int side) {
-  return t[static_cast<std::size_t>(side)] < t[static_cast<std::size_t>((side + 1) % 3)];
+  return t[side] < t[(side + 1) % 3];
 }
 
 bool is_degenerate(const Vector3& a, const Vector3& b, const Vector3& c) {
@@ -133,7 +132,7 @@ int count_split_vertices(int vertex_count, const std::vector<Triangle>& triangle
   for (int v = 0; v < vertex_count; ++v) {
     seen.clear();
     for (const int* t = around.begin(v); t != around.end(v); ++t) {
-      const Triangle& triangle = triangles[static_cast<std::size_t>(*t)];
+      const Triangle& triangle = triangles[*t];
       const std::size_t own = triangle[0] == v ? 0 : triangle[1] == v ? 1 : 2;
       const int b = triangle[(own + 1) % 3], c = triangle[(own + 2) % 3];
       corners.join(b, c);
@@ -187,8 +186,8 @@ std::vector<int> nearby_first(const std::vector<Vector3>& vertices, double toler
       if ((ix && xs[0] == xs[1]) || (iy && ys[0] == ys[1]) || (iz && zs[0] == zs[1])) continue;
       const auto found = newest.find({xs[ix], ys[iy], zs[iz]});
       if (found == newest.end()) continue;
-      for (int k = found->second; k >= 0; k = older[static_cast<std::size_t>(k)]) {
-        if (k < keeper[v] && (vertices[static_cast<std::size_t>(k)] - p).norm() <= tolerance) keeper[v] = k;
+      for (int k = found->second; k >= 0; k = older[k]) {
+        if (k < keeper[v] && (vertices[k] - p).norm() <= tolerance) keeper[v] = k;
       }
     }
     if (keeper[v] != static_cast<int>(v)) continue;
@@ -202,7 +201,7 @@ std::vector<int> nearby_first(const std::vector<Vector3>& vertices, double toler
 void drop_unreferenced(TriangleMesh& mesh) {
   std::vector<int> renamed(mesh.vertices.size(), -1);
   for (const Triangle& t : mesh.triangles) {
-    for (const int v : t) renamed[static_cast<std::size_t>(v)] = 0;
+    for (const int v : t) renamed[v] = 0;
   }
   std::size_t kept = 0;
   for (std::size_t v = 0; v < renamed.size(); ++v) {
@@ -212,14 +211,14 @@ void drop_unreferenced(TriangleMesh& mesh) {
   }
   mesh.vertices.resize(kept);
   for (Triangle& t : mesh.triangles) {
-    for (int& v : t) v = renamed[static_cast<std::size_t>(v)];
+    for (int& v : t) v = renamed[v];
   }
 }
 
 double volume_over(const std::vector<Vector3>& vertices, const Triangle& t, const Vector3& apex) {
-  const Vector3 a = vertices[static_cast<std::size_t>(t[0])] - apex;
-  const Vector3 b = vertices[static_cast<std::size_t>(t[1])] - apex;
-  const Vector3 c = vertices[static_cast<std::size_t>(t[2])] - apex;
+  const Vector3 a = vertices[t[0]] - apex;
+  const Vector3 b = vertices[t[1]] - apex;
+  const Vector3 c = vertices[t[2]] - apex;
   return a.dot(b.cross(c)) / 6.0;
 }
 
@@ -230,16 +229,15 @@ MeshTopology build_topology(int vertex_count, const std::vector<Triangle>& trian
   topology.triangle_edges.resize(triangles.size());
   topology.edges.reserve(triangles.size() * 3 / 2);
   topology.edge_triangles.reserve(triangles.size() * 3 / 2);
-  for_each_edge(
-      sort_half_edges(vertex_count, triangles), [&](int low, int high, const HalfEdge* side, const HalfEdge* last) {
-        const int edge = static_cast<int>(topology.edges.size());
-        topology.edges.push_back({low, high});
-        topology.edge_triangles.push_back({side->half / 3, last - side > 1 ? side[1].half / 3 : -1});
-        for (; side != last; ++side) {
-          topology.triangle_edges[static_cast<std::size_t>(side->half / 3)][static_cast<std::size_t>(side->half % 3)] =
-              edge;
-        }
-      });
+  for_each_edge(sort_half_edges(vertex_count, triangles),
+                [&](int low, int high, const HalfEdge* side, const HalfEdge* last) {
+                  const int edge = static_cast<int>(topology.edges.size());
+                  topology.edges.push_back({low, high});
+                  topology.edge_triangles.push_back({side->half / 3, last - side > 1 ? side[1].half / 3 : -1});
+                  for (; side != last; ++side) {
+                    topology.triangle_edges[side->half / 3][side->half % 3] = edge;
+                  }
+                });
   topology.vertex_edges = invert(vertex_count, topology.edges);
   topology.vertex_triangles = invert(vertex_count, triangles);
   return topology;
@@ -267,7 +265,7 @@ MeshFaults inspect(const TriangleMesh& mesh) {
   sound.reserve(mesh.triangles.size());
   DisjointSets surfaces(vertex_count);
   for (const Triangle& t : mesh.triangles) {
-    for (const int v : t) referenced[static_cast<std::size_t>(v)] = 1;
+    for (const int v : t) referenced[v] = 1;
     surfaces.join(t[0], t[1]);
     surfaces.join(t[0], t[2]);
     if (has_repeated_corner(t)) {
@@ -275,12 +273,10 @@ MeshFaults inspect(const TriangleMesh& mesh) {
       continue;
     }
     sound.push_back(t);
-    faults.degenerate_triangles +=
-        is_degenerate(mesh.vertices[static_cast<std::size_t>(t[0])], mesh.vertices[static_cast<std::size_t>(t[1])],
-                      mesh.vertices[static_cast<std::size_t>(t[2])]);
+    faults.degenerate_triangles += is_degenerate(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]);
   }
   for (int v = 0; v < vertex_count; ++v) {
-    if (!referenced[static_cast<std::size_t>(v)]) {
+    if (!referenced[v]) {
       ++faults.unreferenced_vertices;
     } else {
       faults.components += surfaces.root(v) == v;
@@ -289,9 +285,7 @@ MeshFaults inspect(const TriangleMesh& mesh) {
   faults.duplicate_triangles = count_duplicates(sound);
   faults.non_manifold_vertices = count_split_vertices(vertex_count, sound);
   for_each_edge(sort_half_edges(vertex_count, sound), [&](int, int, const HalfEdge* side, const HalfEdge* last) {
-    const auto forward = [&](const HalfEdge& h) {
-      return runs_low_to_high(sound[static_cast<std::size_t>(h.half / 3)], h.half % 3);
-    };
+    const auto forward = [&](const HalfEdge& h) { return runs_low_to_high(sound[h.half / 3], h.half % 3); };
     faults.boundary_edges += last - side == 1;
     faults.non_manifold_edges += last - side > 2;
     faults.misoriented_edges += last - side == 2 && forward(side[0]) == forward(side[1]);
@@ -304,7 +298,7 @@ WeldReport weld(TriangleMesh& mesh, double tolerance) {
   const std::vector<int> keeper = nearby_first(mesh.vertices, tolerance);
   for (std::size_t v = 0; v < keeper.size(); ++v) report.merged_vertices += keeper[v] != static_cast<int>(v);
   for (Triangle& t : mesh.triangles) {
-    for (int& v : t) v = keeper[static_cast<std::size_t>(v)];
+    for (int& v : t) v = keeper[v];
   }
   const auto collapsed = std::remove_if(mesh.triangles.begin(), mesh.triangles.end(), has_repeated_corner);
   report.removed_triangles = static_cast<int>(mesh.triangles.end() - collapsed);
@@ -329,8 +323,8 @@ int orient_outward(TriangleMesh& mesh) {
     for (std::size_t next = 0; next < surface.size(); ++next) {
       const std::size_t t = surface[next];
       for (const int edge : topology.triangle_edges[t]) {
-        for (const int neighbour : topology.edge_triangles[static_cast<std::size_t>(edge)]) {
-          const auto n = static_cast<std::size_t>(neighbour);
+        for (const int neighbour : topology.edge_triangles[edge]) {
+          const int n = neighbour;
           if (neighbour < 0 || visited[n]) continue;
           visited[n] = 1;
           const bool same_way = runs_low_to_high(mesh.triangles[t], side_of(t, edge)) ==
@@ -342,7 +336,7 @@ int orient_outward(TriangleMesh& mesh) {
     }
     Vector3 centre = Vector3::Zero();
     for (const std::size_t t : surface) {
-      for (const int v : mesh.triangles[t]) centre += mesh.vertices[static_cast<std::size_t>(v)];
+      for (const int v : mesh.triangles[t]) centre += mesh.vertices[v];
     }
     centre /= 3.0 * static_cast<double>(surface.size());
     double volume = 0.0;
@@ -373,14 +367,14 @@ int close_holes(TriangleMesh& mesh) {
   for_each_edge(sort_half_edges(static_cast<int>(mesh.vertices.size()), mesh.triangles),
                 [&](int, int, const HalfEdge* side, const HalfEdge* last) {
                   if (last - side != 1) return;
-                  const Triangle& t = mesh.triangles[static_cast<std::size_t>(side->half / 3)];
-                  const auto corner = static_cast<std::size_t>(side->half % 3);
+                  const Triangle& t = mesh.triangles[side->half / 3];
+                  const int corner = side->half % 3;
                   boundary.push_back({t[corner], t[(corner + 1) % 3]});
                 });
   for (std::size_t b = 0; b < boundary.size(); ++b) {
     for (const int v : boundary[b]) {
-      Sides& sides = at[static_cast<std::size_t>(v)];
-      if (sides.count < 2) sides.side[static_cast<std::size_t>(sides.count)] = b;
+      Sides& sides = at[v];
+      if (sides.count < 2) sides.side[sides.count] = b;
       ++sides.count;
     }
   }
@@ -397,15 +391,14 @@ int close_holes(TriangleMesh& mesh) {
       used[b] = 1;
       loop.push_back(b);
       v = boundary[b][0] == v ? boundary[b][1] : boundary[b][0];
-      const Sides& sides = at[static_cast<std::size_t>(v)];
+      const Sides& sides = at[v];
       simple = sides.count == 2;
       b = sides.side[0] == b ? sides.side[1] : sides.side[0];
     } while (simple && !used[b]);
     if (!simple || b != seed || loop.size() < 3) continue;
     Vector3 centre = Vector3::Zero();
     for (const std::size_t side : loop) {
-      centre += mesh.vertices[static_cast<std::size_t>(boundary[side][0])] +
-                mesh.vertices[static_cast<std::size_t>(boundary[side][1])];
+      centre += mesh.vertices[boundary[side][0]] + mesh.vertices[boundary[side][1]];
     }
     const int apex = static_cast<int>(mesh.vertices.size());
     mesh.vertices.push_back(centre / (2.0 * static_cast<double>(loop.size())));
@@ -429,7 +422,7 @@ double mean_edge_length(const std::vector<Vector3>& vertices, const std::vector<
   if (edges.empty()) return 0.0;
   double sum = 0.0;
   for (const Edge& e : edges) {
-    sum += (vertices[static_cast<std::size_t>(e[0])] - vertices[static_cast<std::size_t>(e[1])]).norm();
+    sum += (vertices[e[0]] - vertices[e[1]]).norm();
   }
   return sum / static_cast<double>(edges.size());
 }
