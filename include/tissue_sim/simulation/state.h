@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "tissue_sim/geometry/pose.h"
+#include "tissue_sim/simulation/world.h"
+
+namespace tissue_sim {
+
+/// What a step changes of one organ, and all that the next step reads of it.
+struct OrganState {
+  std::vector<Vector3> positions;               ///< m, scene frame
+  std::vector<Vector3> velocities;              ///< m/s
+  std::vector<double> depths;                   ///< m, 0 where no instrument presses
+  std::vector<char> held;                       ///< 1: moved by an instrument and left there (restoration off)
+  std::vector<std::vector<char>> colliding;     ///< per piece, one a vertex: the paper's memory; empty for the flood
+  std::vector<std::vector<int>> touching;       ///< per piece: vertices that were in contact in the last substep
+  bool asleep = true;                           ///< at rest and untouched: nothing to integrate
+};
+
+/// Small, flat, copied to restore or compare.
+struct State {
+  std::vector<OrganState> organs;
+};
+
+State rest_state(const World& world);
+OrganState rest_state(const World& world, int organ);
+
+/// A number that differs when any bit of what an organ shows or moves by differs: positions, velocities, depths.
+std::uint64_t hash_state(const OrganState& organ, std::uint64_t seed);
+std::uint64_t hash_word(std::uint64_t word, std::uint64_t seed);
+
+}  // namespace tissue_sim

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "tissue_sim/geometry/triangle_mesh.h"
+
+namespace tissue_sim {
+
+/// A piece of tissue that stores energy: E = 1/2 k C^2 with a dimensionless constraint C of its vertices' positions.
+/// Force on vertex i: -(k C + d dC/dt) grad_i C. The second part is the damping of Teschner et al. 2004: it acts along
+/// the constraint only, so it never slows a rigid motion.
+///
+/// Each kind adds `evaluate(x, gradient)`, which returns C and writes its gradient (1/m) at every vertex.
+template <std::size_t size_>
+struct Element {
+  static constexpr std::size_t size = size_;
+  std::array<int, size_> vertices{};
+  double rest = 0.0;       ///< the measure at rest: m, m^2 or m^3
+  double scale = 1.0;      ///< what the measure's change is divided by: rest, or a floor where rest is near zero
+  double stiffness = 0.0;  ///< k, J
+  double damping = 0.0;    ///< d, J s
+};
+
+template <class Kind>
+using ElementVectors = std::array<Vector3, Kind::size>;
+
+/// Positions, velocities or any other vectors of an element's vertices.
+template <class Kind>
+ElementVectors<Kind> gather(const Kind& element, const std::vector<Vector3>& of_all) {
+  ElementVectors<Kind> of_element;
+  for (std::size_t i = 0; i < Kind::size; ++i) of_element[i] = of_all[element.vertices[i]];
+  return of_element;
+}
+
+/// Adds the element's forces (N). Returns its energy (J).
+template <class Kind>
+double add_forces(const Kind& element, const std::vector<Vector3>& positions, const std::vector<Vector3>& velocities,
+                  std::vector<Vector3>& forces) {
+  ElementVectors<Kind> gradient;
+  const double c = element.evaluate(gather(element, positions), gradient);
+  double rate = 0.0;
+  for (std::size_t i = 0; i < Kind::size; ++i) rate += gradient[i].dot(velocities[element.vertices[i]]);
+  const double pull = element.stiffness * c + element.damping * rate;
+  for (std::size_t i = 0; i < Kind::size; ++i) forces[element.vertices[i]] -= pull * gradient[i];
+  return 0.5 * element.stiffness * c * c;
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,17 @@
+#pragma once
+
+#include "tissue_sim/tissue/rest_shape.h"
+
+namespace tissue_sim {
+
+/// Raises the mass of the few vertices that would force tiny substeps, by at most `fraction` of the organ's mass in all.
+/// Vertex i can vibrate no faster than omega_i^2 = (sum over its elements of k |grad_i C| sum_j |grad_j C|) / m_i (Gershgorin);
+/// the lowest common bound on omega_i that the fraction pays for is found and met.
+void apply_mass_floor(double fraction, RestShape& shape);
+
+/// The substep (s) at which the explicit integrator stays stable, `safety` times the bound. Stability of the symplectic step needs
+/// (dt omega / 2)^2 + dt lambda / 2 < 1, where omega^2 and lambda are the largest eigenvalues of stiffness and damping over mass,
+/// taken at rest by power iteration.
+double stable_substep(const RestShape& shape, double safety);
+
+}  // namespace tissue_sim

@@ -1,0 +1,136 @@
+#include "tissue_sim/tissue/stability.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+namespace tissue_sim {
+
+namespace {
+
+constexpr int power_iterations = 200;
+
+template <class Kind>
+void add_row_sums(const std::vector<Kind>& elements, const std::vector<Vector3>& positions, std::vector<double>& sums) {
+  ElementVectors<Kind> gradient;
+  for (const Kind& element : elements) {
+    element.evaluate(gather(element, positions), gradient);
+    double of_all = 0.0;
+    for (const Vector3& g : gradient) of_all += g.norm();
+    for (std::size_t i = 0; i < Kind::size; ++i) {
+      sums[element.vertices[i]] += element.stiffness * gradient[i].norm() * of_all;
+    }
+  }
+}
+
+/// y += sum over the elements of factor grad C (grad C . x): stiffness or damping at rest.
+template <class Kind>
+void add_product(const std::vector<Kind>& elements, double Element<Kind::size>::*factor, const RestShape& shape,
+                 const std::vector<Vector3>& x, std::vector<Vector3>& y) {
+  ElementVectors<Kind> gradient;
+  for (const Kind& element : elements) {
+    element.evaluate(gather(element, shape.positions), gradient);
+    double along = 0.0;
+    for (std::size_t i = 0; i < Kind::size; ++i) along += gradient[i].dot(x[element.vertices[i]]);
+    for (std::size_t i = 0; i < Kind::size; ++i) y[element.vertices[i]] += element.*factor * along * gradient[i];
+  }
+}
+
+/// The largest eigenvalue of M^-1/2 A M^-1/2, where product(x, y) adds A x to y.
+template <class Product>
+double largest_eigenvalue(const RestShape& shape, Product&& product) {
+  const std::size_t n = shape.positions.size();
+  std::vector<Vector3> x(n);
+  std::vector<Vector3> y(n);
+  std::uint32_t random = 1;
+  for (Vector3& v : x) {
+    for (double& component : {std::ref(v.x()), std::ref(v.y()), std::ref(v.z())}) {
+      random = random * 1664525u + 1013904223u;
+      component = static_cast<double>(random) / 4294967296.0 - 0.5;
+    }
+  }
+
+  double eigenvalue = 0.0;
+  for (int iteration = 0; iteration < power_iterations; ++iteration) {
+    double norm = 0.0;
+    for (const Vector3& v : x) norm += v.squaredNorm();
+    if (!(norm > 0.0)) return 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+      y[i].setZero();
+      x[i] *= std::sqrt(shape.inverse_mass[i] / norm);
+    }
+    product(x, y);
+    eigenvalue = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+      y[i] *= std::sqrt(shape.inverse_mass[i]);
+      eigenvalue += y[i].squaredNorm();
+    }
+    eigenvalue = std::sqrt(eigenvalue);
+    x.swap(y);
+  }
+  return eigenvalue;
+}
+
+}  // namespace
+
+void apply_mass_floor(double fraction, RestShape& shape) {
+  std::vector<double> sums(shape.positions.size(), 0.0);
+  add_row_sums(shape.distances, shape.positions, sums);
+  add_row_sums(shape.areas, shape.positions, sums);
+  add_row_sums(shape.flaps, shape.positions, sums);
+
+  double total = 0.0;
+  double fastest = 0.0;
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    if (shape.attached[i]) sums[i] = 0.0;  // never moves
+    total += shape.mass[i];
+    fastest = std::max(fastest, sums[i] / shape.mass[i]);
+  }
+  const auto added_at = [&](double bound) {
+    double added = 0.0;
+    for (std::size_t i = 0; i < sums.size(); ++i) added += std::max(0.0, sums[i] / bound - shape.mass[i]);
+    return added;
+  };
+
+  double too_low = 0.0;
+  double enough = fastest;
+  for (int halving = 0; halving < 60; ++halving) {
+    const double middle = 0.5 * (too_low + enough);
+    (added_at(middle) > fraction * total ? too_low : enough) = middle;
+  }
+  if (!(enough > 0.0)) return;
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    const double raised = std::max(shape.mass[i], sums[i] / enough);
+    shape.added_mass += raised - shape.mass[i];
+    shape.mass[i] = raised;
+  }
+}
+
+double stable_substep(const RestShape& shape, double safety) {
+  std::vector<Vector3> enclosed_gradient(shape.positions.size());
+  if (shape.enclosed.stiffness > 0.0) shape.enclosed.evaluate(shape.positions, shape.triangles, enclosed_gradient);
+  const auto add_enclosed = [&](double factor, const std::vector<Vector3>& x, std::vector<Vector3>& y) {
+    if (!(factor > 0.0)) return;
+    double along = 0.0;
+    for (std::size_t i = 0; i < x.size(); ++i) along += enclosed_gradient[i].dot(x[i]);
+    for (std::size_t i = 0; i < x.size(); ++i) y[i] += factor * along * enclosed_gradient[i];
+  };
+  const double omega_squared = largest_eigenvalue(shape, [&](const std::vector<Vector3>& x, std::vector<Vector3>& y) {
+    add_product(shape.distances, &DistanceElement::stiffness, shape, x, y);
+    add_product(shape.areas, &AreaElement::stiffness, shape, x, y);
+    add_product(shape.flaps, &VolumeElement::stiffness, shape, x, y);
+    add_enclosed(shape.enclosed.stiffness, x, y);
+  });
+  const double lambda = largest_eigenvalue(shape, [&](const std::vector<Vector3>& x, std::vector<Vector3>& y) {
+    add_product(shape.distances, &DistanceElement::damping, shape, x, y);
+    add_product(shape.areas, &AreaElement::damping, shape, x, y);
+    add_product(shape.flaps, &VolumeElement::damping, shape, x, y);
+    add_enclosed(shape.enclosed.damping, x, y);
+  });
+
+  const double a = omega_squared / (4.0 * safety * safety);
+  const double b = lambda / (2.0 * safety);
+  return a > 0.0 ? (std::sqrt(b * b + 4.0 * a) - b) / (2.0 * a) : 0.0;
+}
+
+}  // namespace tissue_sim
