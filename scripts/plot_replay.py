@@ -27,7 +27,8 @@ def main():
               ("contacts", "tab:gray", [row["contacts"] for row in rows]))
 
     plt.rcParams["svg.hashsalt"] = "tissue_sim"  # the same picture for the same numbers, byte for byte
-    figure, axes = plt.subplots(len(curves), 1, sharex=True, figsize=(8, 6), height_ratios=(3, 3, 1))
+    figure, axes = plt.subplots(len(curves), 1, sharex=True, figsize=(8, 6),
+                                gridspec_kw={"height_ratios": (3, 3, 1)})
     for axis, (label, color, values) in zip(axes, curves):
         axis.plot(seconds, values, color=color, linewidth=1.2)
         axis.fill_between(seconds, values, color=color, alpha=0.15, linewidth=0)
