@@ -1,0 +1,39 @@
+#pragma once
+
+#include <geometry_msgs/PoseStamped.h>
+#include <tf2/buffer_core.h>
+
+#include <cstdint>
+#include <deque>
+#include <string>
+
+#include "tissue_sim/simulation/timeline.h"
+
+namespace tissue_sim {
+
+/// A pose in the scene's frame that remembers the frame it came in: the wrench goes back there.
+struct FramedPose {
+  StampedPose in_scene;
+  std::string frame;
+  Eigen::Quaterniond frame_to_scene = Eigen::Quaterniond::Identity();
+};
+
+/// Takes a pose into the scene's frame with the transform at the pose's own stamp. False, with `why`, when there is
+/// no such transform (yet). Without a change of frame no transform is looked up at all.
+bool into_scene_frame(const tf2::BufferCore& transforms, const std::string& scene_frame,
+                      const geometry_msgs::PoseStamped& message, FramedPose& pose, std::string& why);
+
+/// The frames that one instrument's poses came in, until the steps have caught up with them.
+class FrameHistory {
+ public:
+  void add(const FramedPose& pose) { frames_.push_back(pose); }
+  void clear() { frames_.clear(); }
+
+  /// The last pose at or before `stamp`; forgets the ones before it. Null when there is none.
+  const FramedPose* at(std::int64_t stamp);
+
+ private:
+  std::deque<FramedPose> frames_;
+};
+
+}  // namespace tissue_sim

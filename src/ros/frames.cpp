@@ -1,0 +1,56 @@
+#include "tissue_sim/ros/frames.h"
+
+#include <tf2/exceptions.h>
+
+#include "tissue_sim/ros/messages.h"
+
+namespace tissue_sim {
+namespace {
+
+// tf2 refuses the leading slash that older drivers still write.
+std::string without_slash(const std::string& frame) {
+  return !frame.empty() && frame[0] == '/' ? frame.substr(1) : frame;
+}
+
+}  // namespace
+
+bool into_scene_frame(const tf2::BufferCore& transforms, const std::string& scene_frame,
+                      const geometry_msgs::PoseStamped& message, FramedPose& pose, std::string& why) {
+  pose.in_scene.stamp = static_cast<std::int64_t>(message.header.stamp.toNSec());
+  pose.in_scene.pose = to_pose(message.pose);
+  pose.frame = message.header.frame_id;
+  pose.frame_to_scene = Eigen::Quaterniond::Identity();
+
+  const std::string source = without_slash(message.header.frame_id);
+  const std::string target = without_slash(scene_frame);
+  // The timeline refuses a zero stamp, and tf2 would read it as "the latest".
+  if (source == target || message.header.stamp.isZero()) return true;
+  if (source.empty()) {
+    why = "the poses name no frame: fill in header.frame_id";
+    return false;
+  }
+
+  Pose to_scene;
+  try {
+    const geometry_msgs::Transform found = transforms.lookupTransform(target, source, message.header.stamp).transform;
+    to_scene.position = {found.translation.x, found.translation.y, found.translation.z};
+    to_scene.orientation =
+        Eigen::Quaterniond(found.rotation.w, found.rotation.x, found.rotation.y, found.rotation.z).normalized();
+  } catch (const tf2::TransformException& error) {
+    why = "no transform from \"" + source + "\" to \"" + target + "\" (" + error.what() +
+          "): publish it, or give the scene the frame of the poses";
+    return false;
+  }
+  // Not through Pose's product, which would normalise: a faulty quaternion has to reach the timeline as it is.
+  pose.in_scene.pose.position = to_scene.apply(pose.in_scene.pose.position);
+  pose.in_scene.pose.orientation = to_scene.orientation * pose.in_scene.pose.orientation;
+  pose.frame_to_scene = to_scene.orientation;
+  return true;
+}
+
+const FramedPose* FrameHistory::at(std::int64_t stamp) {
+  while (frames_.size() > 1 && frames_[1].in_scene.stamp <= stamp) frames_.pop_front();
+  return frames_.empty() ? nullptr : &frames_.front();
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,329 @@
+#include "tissue_sim/ros/node.h"
+
+#include <diagnostic_msgs/DiagnosticArray.h>
+
+#include <algorithm>
+
+#include "tissue_sim/scene/scene_file.h"
+
+namespace tissue_sim {
+namespace {
+
+constexpr double idle_wait = 0.002;               // s the loop sleeps where nothing is to be done; adds to the latency
+constexpr double diagnostics_period = 1.0;        // s of wall time
+constexpr double poses_stopped_after = 0.25;      // s of wall time without a pose; then the counts are final
+constexpr double warning_period = 5.0;            // s of wall time between two warnings of one cause and topic
+constexpr int missing_transform = pose_verdicts;  // a cause beside the timeline's
+
+// advance: realtime stays this far behind the clock (ns), so that a pose that is late by less is still taken.
+constexpr std::int64_t hold_off = 100'000'000;
+
+// Live, the newest pose wins, and the ones before it are counted by the timeline: enough to see a burst whole.
+constexpr unsigned live_queue = 100;
+constexpr unsigned no_limit = 0;
+
+Scene load(const std::string& path) {
+  std::vector<std::string> warnings;
+  Scene scene = load_scene(path, warnings);
+  for (const std::string& warning : warnings) ROS_WARN_STREAM(warning);
+  return scene;
+}
+
+const char* cure(int cause) {
+  switch (cause) {
+    case static_cast<int>(PoseVerdict::zero_stamp):
+      return "a pose has a zero stamp and is dropped: stamp poses with the time of the measurement";
+    case static_cast<int>(PoseVerdict::non_finite):
+      return "a pose has a value that is not finite and is dropped: look at its source";
+    case static_cast<int>(PoseVerdict::zero_quaternion):
+      return "a pose has a zero quaternion and is dropped: write orientation.w = 1 for no rotation";
+    case static_cast<int>(PoseVerdict::stale):
+      return "a pose is stamped no later than the one before and is dropped: send poses in the order of their stamps";
+    default:
+      return "";
+  }
+}
+
+void add(StepProfile& sum, const StepProfile& step) {
+  sum.refit += step.refit;
+  sum.detection += step.detection;
+  sum.penetration += step.penetration;
+  sum.propagation += step.propagation;
+  sum.response += step.response;
+  sum.deformation += step.deformation;
+  sum.health += step.health;
+  sum.total += step.total;
+}
+
+}  // namespace
+
+Node::Node(const NodeParameters& parameters)
+    : parameters_(parameters), scene_(load(parameters.scene)), timeline_(scene_, parameters.timeline) {
+  node_.setCallbackQueue(&poses_);
+  private_.setCallbackQueue(&poses_);
+  serving_.setCallbackQueue(&services_);
+  advertise();
+}
+
+void Node::advertise() {
+  contacts_ = private_.advertise<Contacts>("contacts", 100);
+  diagnostics_ = node_.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10);
+  // Who looks on before the first pose sees the organs at rest.
+  markers_ = serving_.advertise<visualization_msgs::MarkerArray>(
+      "markers", 2,
+      [this](const ros::SingleSubscriberPublisher& viewer) { viewer.publish(markers_message(scene_, timeline_)); });
+
+  outputs_.resize(scene_.organs.size());
+  for (std::size_t i = 0; i < outputs_.size(); ++i) {
+    Output& output = outputs_[i];
+    const std::string& name = scene_.organs[i].name;
+    output.topology = topology_message(scene_, static_cast<int>(i));
+    output.state_publisher = private_.advertise<TissueState>(name + "/state", 10);
+    output.topology_publisher = private_.advertise<TissueTopology>(name + "/topology", 1, true);
+    output.topology_publisher.publish(output.topology);
+  }
+  reset_server_ = serving_.advertiseService("reset", &Node::reset, this);
+  topology_server_ = serving_.advertiseService("get_topology", &Node::get_topology, this);
+
+  inputs_.resize(scene_.instruments.size());
+  for (std::size_t i = 0; i < inputs_.size(); ++i) {
+    const Instrument& instrument = scene_.instruments[i];
+    inputs_[i].wrench = private_.advertise<geometry_msgs::WrenchStamped>(instrument.name + "/measured_cf", 100);
+    const boost::function<void(const geometry_msgs::PoseStamped&)> take = [this, i](const auto& message) {
+      inputs_[i].waiting.push_back({message, ros::WallTime::now()});
+      last_pose_ = ros::WallTime::now();
+      pose_since_diagnostics_ = true;
+    };
+    inputs_[i].subscriber = node_.subscribe<geometry_msgs::PoseStamped>(
+        instrument.pose_topic, parameters_.keep_all_poses ? no_limit : live_queue, take, ros::VoidConstPtr(),
+        ros::TransportHints().tcpNoDelay());
+    ROS_INFO_STREAM("instrument \"" << instrument.name << "\" follows " << inputs_[i].subscriber.getTopic());
+  }
+}
+
+void Node::spin() {
+  while (ros::ok()) {
+    poses_.callAvailable(ros::WallDuration(idle_wait));
+    while (ros::ok() && take_poses()) step_while_poses_allow();
+    step_while_poses_allow();
+    if (parameters_.realtime) hold_in_realtime();
+    services_.callAvailable();
+    diagnose_when_due();
+  }
+}
+
+/// Gives the timeline the poses whose transforms are there. In a replay it is one pose at a time, as the offline
+/// replay does: a pose that starts a new run must not reach the timeline before the steps of the old run are made.
+bool Node::take_poses() {
+  bool taken = false;
+  for (std::size_t i = 0; i < inputs_.size(); ++i) {
+    std::deque<Waiting>& waiting = inputs_[i].waiting;
+    while (!waiting.empty() && !(taken && parameters_.keep_all_poses)) {
+      FramedPose pose;
+      std::string why;
+      if (into_scene_frame(transforms_, scene_.frame, waiting.front().message, pose, why)) {
+        give_pose(i, pose);
+        taken = true;
+      } else if ((ros::WallTime::now() - waiting.front().arrival).toSec() < parameters_.tf_timeout) {
+        break;
+      } else {
+        ++missing_transforms_;
+        warn(i, missing_transform, why + "; the last pose is held");
+      }
+      waiting.pop_front();
+    }
+  }
+  return taken;
+}
+
+void Node::give_pose(std::size_t instrument, const FramedPose& pose) {
+  Input& input = inputs_[instrument];
+  const PoseVerdict verdict = timeline_.add_pose(static_cast<int>(instrument), pose.in_scene);
+  if (verdict == PoseVerdict::new_run) {
+    ROS_INFO_STREAM("stamps on " << input.subscriber.getTopic() << " went back: a new run, organs at rest");
+    for (Input& each : inputs_) each.frames.clear();
+    // tf2 keeps refusing what is older than what it holds. On a simulated clock it clears itself.
+    if (!ros::Time::isSimTime()) transforms_.clear();
+  } else if (verdict != PoseVerdict::used) {
+    warn(instrument, static_cast<int>(verdict), cure(static_cast<int>(verdict)));
+    return;
+  }
+  input.frames.add(pose);
+  held_from_ = pose.in_scene.stamp;
+  held_since_ = ros::Time::now();
+}
+
+void Node::step_while_poses_allow() {
+  while (ros::ok() && timeline_.step()) {
+    after_step(false);
+    services_.callAvailable();
+    diagnose_when_due();
+    if (parameters_.keep_all_poses) continue;
+    poses_.callAvailable();  // a newer pose may have come
+    take_poses();
+  }
+}
+
+/// Where poses stop coming, simulated time goes on from the last one as fast as the clock, whatever the stamps are.
+void Node::hold_in_realtime() {
+  if (held_from_ == 0) return;
+  const std::int64_t until = held_from_ + (ros::Time::now() - held_since_).toNSec() - hold_off;
+  while (ros::ok() && poses_.isEmpty() && timeline_.now() < until && timeline_.step_holding(until)) {
+    after_step(true);
+    services_.callAvailable();
+    diagnose_when_due();
+  }
+}
+
+void Node::after_step(bool holding) {
+  const StepReport& report = timeline_.report();
+  add(profile_, report.profile);
+  ++period_steps_;
+  // Zero before the first step, and a new run goes back: neither is time that was simulated.
+  if (last_step_stamp_ > 0 && report.stamp > last_step_stamp_) period_nanoseconds_ += report.stamp - last_step_stamp_;
+  last_step_stamp_ = report.stamp;
+  if (report.recovered) ROS_ERROR_STREAM("step " << report.step << " went bad: the last good state is back");
+
+  if (report.pose_reached || (holding && report.state_due)) {
+    if (contacts_.getNumSubscribers() > 0) contacts_.publish(contacts_message(scene_, report));
+    for (std::size_t i = 0; i < inputs_.size(); ++i) {
+      const FramedPose* pose = inputs_[i].frames.at(report.stamp);
+      if (pose == nullptr || inputs_[i].wrench.getNumSubscribers() == 0) continue;
+      inputs_[i].wrench.publish(wrench_message(report.wrenches[i], report.stamp, pose->frame, pose->frame_to_scene));
+    }
+  }
+  if (!report.state_due) return;
+  for (std::size_t i = 0; i < outputs_.size(); ++i) {
+    if (outputs_[i].state_publisher.getNumSubscribers() == 0) continue;
+    outputs_[i].state_publisher.publish(
+        state_message(scene_, timeline_, static_cast<int>(i), outputs_[i].topology.topology_id));
+  }
+  publish_markers();
+}
+
+void Node::publish_markers() {
+  if (markers_.getNumSubscribers() > 0) markers_.publish(markers_message(scene_, timeline_));
+}
+
+void Node::diagnose_when_due() {
+  const ros::WallTime now = ros::WallTime::now();
+  const bool stopped = pose_since_diagnostics_ && (now - last_pose_).toSec() > poses_stopped_after;
+  if (!stopped && (now - last_diagnostics_).toSec() < diagnostics_period) return;
+  publish_diagnostics();
+  last_diagnostics_ = now;
+  if (stopped) pose_since_diagnostics_ = false;
+}
+
+void Node::publish_diagnostics() {
+  const TimelineCounters& counters = timeline_.counters();
+  const StepReport& report = timeline_.report();
+  const auto count = [&](PoseVerdict verdict) { return counters.poses[static_cast<std::size_t>(verdict)]; };
+
+  diagnostic_msgs::DiagnosticArray array;
+  array.header.stamp = ros::Time::now();
+  array.status.resize(1);
+  diagnostic_msgs::DiagnosticStatus& status = array.status[0];
+  status.name = ros::this_node::getName().substr(1) + ": simulation";
+  status.hardware_id = parameters_.scene;
+
+  add_value(status, "steps", report.step);
+  add_value(status, "simulated_time_s", static_cast<double>(report.stamp) * 1e-9);
+  add_value(status, "state_hash", hash_text(timeline_.hash()));
+  add_value(status, "contacts", static_cast<std::uint64_t>(report.contacts.size()));
+  add_value(status, "active_vertices", static_cast<std::uint64_t>(timeline_.active_vertices()));
+  add_value(status, "substeps", static_cast<std::uint64_t>(report.substeps));
+  add_value(status, "kinetic_energy_J", timeline_.kinetic_energy());
+  add_value(status, "elastic_energy_J", timeline_.elastic_energy());
+
+  // Over the steps since the last diagnostics; how much faster than simulated time they were made.
+  const double per_step = period_steps_ > 0 ? 1e3 / static_cast<double>(period_steps_) : 0.0;
+  const double simulated = static_cast<double>(period_nanoseconds_) * 1e-9;
+  add_value(status, "real_time_factor", profile_.total > 0.0 ? simulated / profile_.total : 0.0);
+  add_value(status, "ms_per_step", profile_.total * per_step);
+  add_value(status, "ms_refit", profile_.refit * per_step);
+  add_value(status, "ms_detection", profile_.detection * per_step);
+  add_value(status, "ms_penetration", profile_.penetration * per_step);
+  add_value(status, "ms_propagation", profile_.propagation * per_step);
+  add_value(status, "ms_response", profile_.response * per_step);
+  add_value(status, "ms_deformation", profile_.deformation * per_step);
+  add_value(status, "ms_health", profile_.health * per_step);
+
+  add_value(status, "poses_used", count(PoseVerdict::used) + count(PoseVerdict::new_run));
+  add_value(status, "new_runs", count(PoseVerdict::new_run));
+  std::uint64_t drops = missing_transforms_;
+  for (const PoseVerdict verdict :
+       {PoseVerdict::zero_stamp, PoseVerdict::non_finite, PoseVerdict::zero_quaternion, PoseVerdict::stale}) {
+    add_value(status, std::string("dropped_") + to_string(verdict), count(verdict));
+    drops += count(verdict);
+  }
+  add_value(status, "dropped_missing_transform", missing_transforms_);
+  add_value(status, "superseded", counters.poses_superseded);
+  add_value(status, "normalised_quaternions", counters.normalised_quaternions);
+  add_value(status, "recoveries", counters.recoveries);
+  add_value(status, "resets", counters.resets);
+
+  status.level = diagnostic_msgs::DiagnosticStatus::OK;
+  status.message = report.step > 0 ? "running" : "waiting for poses";
+  if (drops > reported_drops_) {
+    status.level = diagnostic_msgs::DiagnosticStatus::WARN;
+    status.message = "poses were dropped";
+  }
+  if (counters.recoveries > reported_recoveries_) {
+    status.level = diagnostic_msgs::DiagnosticStatus::ERROR;
+    status.message = "a state went bad and the last good one was restored";
+  }
+  diagnostics_.publish(array);
+
+  reported_drops_ = drops;
+  reported_recoveries_ = counters.recoveries;
+  profile_ = {};
+  period_steps_ = 0;
+  period_nanoseconds_ = 0;
+}
+
+void Node::warn(std::size_t instrument, int cause, const std::string& what) {
+  const ros::WallTime now = ros::WallTime::now();
+  ros::WallTime& last = inputs_[instrument].last_warning[static_cast<std::size_t>(cause)];
+  if ((now - last).toSec() < warning_period) return;
+  last = now;
+  ROS_WARN_STREAM(inputs_[instrument].subscriber.getTopic() << ": " << what);
+}
+
+bool Node::reset(ResetOrgan::Request& request, ResetOrgan::Response& response) {
+  response.step = timeline_.report().step;
+  const int organ = organ_index(request.organ);
+  if (organ < 0 && !request.organ.empty()) {
+    response.message = "no organ \"" + request.organ + "\"; the scene has: " + organ_names();
+    return true;
+  }
+  timeline_.reset(organ);
+  publish_markers();
+  response.success = true;
+  return true;
+}
+
+bool Node::get_topology(GetTopology::Request& request, GetTopology::Response& response) {
+  const int organ = organ_index(request.organ);
+  if (organ < 0) {
+    response.message = "no organ \"" + request.organ + "\"; the scene has: " + organ_names();
+    return true;
+  }
+  response.topology = outputs_[static_cast<std::size_t>(organ)].topology;
+  response.success = true;
+  return true;
+}
+
+/// -1 where there is none.
+int Node::organ_index(const std::string& name) const {
+  const auto found =
+      std::find_if(scene_.organs.begin(), scene_.organs.end(), [&](const Organ& organ) { return organ.name == name; });
+  return found == scene_.organs.end() ? -1 : static_cast<int>(found - scene_.organs.begin());
+}
+
+std::string Node::organ_names() const {
+  std::string names;
+  for (const Organ& organ : scene_.organs) names += (names.empty() ? "" : ", ") + organ.name;
+  return names;
+}
+
+}  // namespace tissue_sim
