@@ -1,0 +1,282 @@
+#include "tissue_sim/scene/scene_file.h"
+
+#include <algorithm>
+#include <cctype>
+#include <functional>
+#include <iomanip>
+#include <limits>
+#include <map>
+#include <set>
+#include <sstream>
+
+#include "tissue_sim/scene/instrument_file.h"
+#include "tissue_sim/scene/mesh_file.h"
+#include "tissue_sim/scene/resource_path.h"
+#include "yaml_mapping.h"
+
+namespace tissue_sim {
+namespace {
+
+/// Objects of one scene whose sizes differ by more than this do not belong together: a mesh in millimetres that is
+/// read as metres, for one.
+constexpr double size_ratio_limit = 1000.0;
+
+/// The wall's distance and area energies reach no smaller Poisson's ratio.
+constexpr double smallest_wall_poisson = 1.0 / 3.0;
+
+bool above_zero(double x) {
+  return x > 0.0;
+}
+
+std::string metres(double length) {
+  std::ostringstream text;
+  text << std::setprecision(4) << length << " m";
+  return text.str();
+}
+
+/// Named frames and their poses in the scene's frame.
+using Frames = std::map<std::string, Pose>;
+
+Pose read_pose(const YamlMapping& yaml) {
+  const Vector3 rpy = yaml.vector("rpy", Vector3::Zero());
+  Pose pose;
+  pose.position = yaml.vector("xyz", Vector3::Zero());
+  pose.orientation = Eigen::AngleAxisd(rpy.z(), Vector3::UnitZ()) * Eigen::AngleAxisd(rpy.y(), Vector3::UnitY()) *
+                     Eigen::AngleAxisd(rpy.x(), Vector3::UnitX());
+  return pose;
+}
+
+void check_parent(const YamlMapping& yaml, const std::string& parent, const std::set<std::string>& names) {
+  if (names.count(parent) > 0) return;
+  std::string allowed;
+  for (const std::string& name : names) allowed += (allowed.empty() ? "" : ", ") + name;
+  yaml.fail("parent", "is '" + parent + "', allowed are the frames of this scene: " + allowed);
+}
+
+/// Frames may stand in any order: those whose parent is placed are placed until none is left.
+Frames read_frames(const YamlMapping& yaml, const std::string& root) {
+  Frames placed{{root, Pose()}};
+  std::vector<YamlMapping> waiting = yaml.list("frames", {"name", "parent", "xyz", "rpy"});
+  std::set<std::string> names{root};
+  for (const YamlMapping& frame : waiting) {
+    const std::string name = frame.name("name");
+    if (!names.insert(name).second) frame.fail("name", "is '" + name + "' like another frame, give each its own");
+    read_pose(frame);
+  }
+  while (!waiting.empty()) {
+    const auto ready = std::find_if(waiting.begin(), waiting.end(),
+                                    [&](const YamlMapping& frame) { return placed.count(frame.text("parent")) > 0; });
+    if (ready == waiting.end()) {
+      for (const YamlMapping& frame : waiting) check_parent(frame, frame.text("parent"), names);
+      waiting.front().fail("parent", "is '" + waiting.front().text("parent") +
+                                         "', which leads round in a circle, a chain of parents ends at '" + root + "'");
+    }
+    placed[ready->name("name")] = placed.at(ready->text("parent")) * read_pose(*ready);
+    waiting.erase(ready);
+  }
+  return placed;
+}
+
+Pose read_organ_pose(const YamlMapping& organ, const Frames& frames, const std::string& root) {
+  if (!organ.has("pose")) return Pose();
+  const YamlMapping yaml = organ.mapping("pose", {"parent", "xyz", "rpy"});
+  const std::string parent = yaml.has("parent") ? yaml.text("parent") : root;
+  std::set<std::string> names;
+  for (const auto& frame : frames) names.insert(frame.first);
+  check_parent(yaml, parent, names);
+  return frames.at(parent) * read_pose(yaml);
+}
+
+Model read_model(const YamlMapping& organ) {
+  const Model model = organ.choice<Model>("model", {{"contact_only", Model::contact_only},
+                                                    {"surface", Model::surface},
+                                                    {"volume", Model::volume},
+                                                    {"fem", Model::fem}});
+  if (model == Model::volume || model == Model::fem) {
+    organ.fail("model", std::string("is ") + to_string(model) +
+                            ", which needs a solid (tetrahedral) mesh that this version cannot step, use surface");
+  }
+  return model;
+}
+
+Material read_material(const YamlMapping& organ) {
+  const YamlMapping yaml = organ.mapping("material", {"young", "poisson", "density", "damping", "drag"});
+  Material material;
+  material.young = yaml.number("young", above_zero, "a number above 0, in Pa (liver 5400, stomach wall 200000)");
+  material.poisson = yaml.number(
+      "poisson", [](double x) { return x >= smallest_wall_poisson && x < 0.5; },
+      "a number from 1/3 (write 0.3334) to below 0.5: the energies of a wall reach no other");
+  material.density = yaml.number("density", above_zero, "a number above 0, in kg/m^3 (soft tissue 1060)");
+  material.damping = yaml.number(
+      "damping", [](double x) { return x >= 0.0 && x <= 1.0; }, "a number from 0 to 1", 0.1);
+  material.drag = yaml.number(
+      "drag", [](double x) { return x >= 0.0 && x <= 1000.0; }, "a number from 0 to 1000, in 1/s", 0.0);
+  return material;
+}
+
+/// Distance of a point from the held region, 0 inside.
+using DistanceFrom = std::function<double(const Vector3&)>;
+
+DistanceFrom read_attachment(const YamlMapping& yaml) {
+  yaml.require_one_of({"sphere", "box"});
+  if (yaml.has("sphere")) {
+    const YamlMapping sphere = yaml.mapping("sphere", {"center", "radius"});
+    const Vector3 center = sphere.vector("center");
+    const double radius = sphere.number("radius", above_zero, "a number above 0, in metres");
+    return [=](const Vector3& p) { return std::max(0.0, (p - center).norm() - radius); };
+  }
+  const YamlMapping box = yaml.mapping("box", {"min", "max"});
+  const Vector3 low = box.vector("min"), high = box.vector("max");
+  if (!(low.array() < high.array()).all())
+    box.fail("max", "is not above min in x, y and z, exchange what is turned round");
+  return [=](const Vector3& p) { return (p - p.cwiseMax(low).cwiseMin(high)).norm(); };
+}
+
+/// Vertices within the attachments, ascending. `vertices` in the organ's own frame.
+std::vector<int> read_attachments(const YamlMapping& organ, const std::vector<Vector3>& vertices) {
+  std::set<int> attached;
+  for (const YamlMapping& yaml : organ.list("attachments", {"sphere", "box"})) {
+    const DistanceFrom distance_from = read_attachment(yaml);
+    double nearest = std::numeric_limits<double>::infinity();
+    for (std::size_t v = 0; v < vertices.size(); ++v) {
+      const double distance = distance_from(vertices[v]);
+      nearest = std::min(nearest, distance);
+      if (distance <= 0.0) attached.insert(static_cast<int>(v));
+    }
+    if (nearest > 0.0) {
+      yaml.fail(yaml.has("sphere") ? "sphere" : "box",
+                "holds no vertex, the nearest is " + metres(nearest) +
+                    " away, move or enlarge it (metres, in the organ's own frame, after its scale)");
+    }
+  }
+  return {attached.begin(), attached.end()};
+}
+
+/// What `load` makes of the file that a key names; the key's place stands before all that it throws and warns.
+template <typename Load>
+auto load_from(const YamlMapping& yaml, const std::string& key, std::vector<std::string>& warnings, Load load) {
+  const std::string reference = yaml.text(key);
+  std::vector<std::string> said;
+  try {
+    auto loaded = load(resolve_path(reference, yaml.file()), said);
+    for (const std::string& warning : said) warnings.push_back(yaml.place(key) + warning);
+    return loaded;
+  } catch (const SceneError& error) {
+    yaml.fail(key, error.what());
+  }
+}
+
+Organ read_organ(const YamlMapping& yaml, const Frames& frames, const std::string& root,
+                 std::vector<std::string>& warnings) {
+  Organ organ;
+  organ.name = yaml.name("name");
+  organ.model = read_model(yaml);
+  organ.restoration = yaml.flag("restoration", true);
+  organ.colliding_set = yaml.choice<CollidingSet>(
+      "colliding_set", {{"flood", CollidingSet::flood}, {"paper", CollidingSet::paper}}, CollidingSet::flood);
+  organ.depth = yaml.choice<DepthScheme>("depth", {{"exact", DepthScheme::exact}, {"paper", DepthScheme::paper}},
+                                         DepthScheme::exact);
+  if (organ.model == Model::surface) {
+    organ.wall_thickness = yaml.number("wall_thickness", above_zero, "a number above 0, in metres");
+  } else if (yaml.has("wall_thickness")) {
+    yaml.fail("wall_thickness", "is used by the model surface only, delete it");
+  }
+  if (organ.model == Model::surface || yaml.has("material")) organ.material = read_material(yaml);
+  const Pose pose = read_organ_pose(yaml, frames, root);
+  const double scale =
+      yaml.number("scale", above_zero, "a number above 0: file units to metres, 0.001 for millimetres");
+  organ.mesh = load_from(yaml, "mesh", warnings, [&](const std::string& path, std::vector<std::string>& said) {
+    return load_organ_mesh(path, scale, said);
+  });
+  organ.attached = read_attachments(yaml, organ.mesh.vertices);
+  for (Vector3& p : organ.mesh.vertices) p = pose.apply(p);
+  if (!inspect(organ.mesh).closed_manifold()) yaml.fail("pose", "moves the organ so far that its shape is lost");
+  return organ;
+}
+
+Instrument read_instrument(const YamlMapping& yaml, std::vector<std::string>& warnings) {
+  Instrument instrument;
+  instrument.name = yaml.name("name");
+  instrument.tip_link = yaml.text("tip_link");
+  instrument.pose_topic = yaml.text("pose_topic");
+  const std::string& topic = instrument.pose_topic;
+  const auto part = [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '/'; };
+  if (!(std::isalpha(static_cast<unsigned char>(topic[0])) || topic[0] == '/' || topic[0] == '~') ||
+      !std::all_of(topic.begin() + 1, topic.end(), part) || topic.find("//") != std::string::npos ||
+      topic.back() == '/' || topic == "~") {
+    yaml.fail("pose_topic", "is '" + topic + "', allowed is the name of a ROS topic such as PSM1/measured_cp");
+  }
+  instrument.parts = load_from(yaml, "urdf", warnings, [&](const std::string& path, std::vector<std::string>& said) {
+    return load_instrument(path, instrument.tip_link, said);
+  });
+  return instrument;
+}
+
+double size_of(const std::vector<const TriangleMesh*>& meshes) {
+  Vector3 low = Vector3::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  for (const TriangleMesh* mesh : meshes) {
+    for (const Vector3& p : mesh->vertices) {
+      low = low.cwiseMin(p);
+      high = high.cwiseMax(p);
+    }
+  }
+  return (high - low).norm();
+}
+
+/// An organ far larger or smaller than an instrument, or than the organ before it, has the wrong scale.
+void check_sizes(const Scene& scene, const std::vector<YamlMapping>& organs) {
+  struct Sized {
+    std::string name;
+    double size;
+  };
+  std::vector<Sized> others;
+  for (const Instrument& instrument : scene.instruments) {
+    std::vector<const TriangleMesh*> meshes;
+    for (const InstrumentPart& part : instrument.parts) meshes.push_back(&part.mesh);
+    others.push_back({"instrument " + instrument.name, size_of(meshes)});
+  }
+  for (std::size_t o = 0; o < scene.organs.size(); ++o) {
+    const double size = size_of({&scene.organs[o].mesh});
+    for (const Sized& other : others) {
+      if (std::max(size / other.size, other.size / size) <= size_ratio_limit) continue;
+      organs[o].fail("scale", "makes this organ " + metres(size) + " in size, but " + other.name + " is " +
+                                  std::to_string(other.size) +
+                                  " m: more than 1000 times apart, 0.001 is the scale of a mesh in millimetres");
+    }
+    others.push_back({"organ " + scene.organs[o].name, size});
+  }
+}
+
+}  // namespace
+
+Scene load_scene(const std::string& path, std::vector<std::string>& warnings) {
+  const YamlMapping yaml(path, {"frame", "gravity", "time_step", "max_substeps", "frames", "organs", "instruments"});
+  Scene scene;
+  scene.frame = yaml.name("frame");
+  scene.gravity = yaml.vector("gravity", Vector3::Zero());
+  scene.time_step = yaml.number(
+      "time_step", [](double x) { return x > 0.0 && x <= 0.1; }, "a number above 0 and at most 0.1, in seconds");
+  scene.max_substeps = yaml.whole_number("max_substeps", 1, 10000, scene.max_substeps);
+  const Frames frames = read_frames(yaml, scene.frame);
+
+  const std::vector<YamlMapping> organs =
+      yaml.list("organs", {"name", "mesh", "scale", "pose", "model", "restoration", "wall_thickness", "material",
+                           "attachments", "colliding_set", "depth"});
+  const std::vector<YamlMapping> instruments = yaml.list("instruments", {"name", "urdf", "tip_link", "pose_topic"});
+  if (organs.empty()) yaml.fail("organs", "is missing or empty, a scene has at least one organ");
+  if (instruments.empty()) yaml.fail("instruments", "is missing or empty, a scene has at least one instrument");
+
+  std::set<std::string> names;
+  for (const std::vector<YamlMapping>* objects : {&organs, &instruments}) {
+    for (const YamlMapping& object : *objects) {
+      const std::string name = object.name("name");
+      if (!names.insert(name).second) object.fail("name", "is '" + name + "' like another object, give each its own");
+    }
+  }
+  for (const YamlMapping& organ : organs) scene.organs.push_back(read_organ(organ, frames, scene.frame, warnings));
+  for (const YamlMapping& instrument : instruments) scene.instruments.push_back(read_instrument(instrument, warnings));
+  check_sizes(scene, organs);
+  return scene;
+}
+
+}  // namespace tissue_sim
