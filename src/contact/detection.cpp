@@ -12,12 +12,6 @@ namespace {
 /// on a triangle, or grids that fall together, then lie on one side for every triangle. Far below any length that matters.
 const Vector3 tie_break(0.61e-9, 0.37e-9, 0.70e-9);
 
-Box bounds_in_scene(const Box& box, const Pose& pose) {
-  const Vector3 centre = pose.apply(0.5 * (box.lower + box.upper));
-  const Vector3 half = pose.orientation.toRotationMatrix().cwiseAbs() * (0.5 * box.size());
-  return {centre - half, centre + half};
-}
-
 Side& side_of(Detection& d, int vertex) {
   if (d.side_stamp[vertex] != d.stamp) {
     d.side_stamp[vertex] = d.stamp;
@@ -35,7 +29,7 @@ void set_side(Detection& d, int vertex, Side side) {
 void gather_candidates(const OrganSurface& organ, const InstrumentSurface& instrument, const Pose& pose, Detection& d) {
   d.candidate_edges.clear();
   d.candidates.clear();
-  organ.tree.for_each_near(bounds_in_scene(instrument.bounds, pose), [&](int triangle) {
+  organ.tree.for_each_near(scene_bounds(instrument.bounds, pose), [&](int triangle) {
     for (const int edge : organ.topology.triangle_edges[triangle]) {
       if (d.edge_stamp[edge] == d.stamp) continue;
       d.edge_stamp[edge] = d.stamp;

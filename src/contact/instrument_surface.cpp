@@ -30,9 +30,16 @@ InstrumentSurface build_instrument_surface(const TriangleMesh& mesh, bool closed
   return surface;
 }
 
+Box scene_bounds(const Box& box, const Pose& pose) {
+  const Vector3 centre = pose.apply(0.5 * (box.lower + box.upper));
+  const Vector3 half = pose.orientation.toRotationMatrix().cwiseAbs() * (0.5 * box.size());
+  return {centre - half, centre + half};
+}
+
 ClosestFeature closest_feature(const InstrumentSurface& surface, const Vector3& p) {
   const ClosestOnMesh closest =
       closest_on_mesh(surface.vertices, surface.triangles, surface.tree, p, std::numeric_limits<double>::max());
+  if (closest.triangle < 0) return {p, Vector3::UnitZ(), -std::numeric_limits<double>::max()};
   const Vector3 normal =
       pseudonormal(surface.vertices, surface.triangles, surface.topology, closest.triangle, closest.on.feature)
           .stableNormalized();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tissue_sim/geometry/aabb_tree.h"
 #include "tissue_sim/tissue/material.h"
 #include "tissue_sim/tissue/stability.h"
 
@@ -172,6 +173,7 @@ RestShape build_rest_shape(const Organ& organ) {
   shape.topology = build_topology(vertex_count, shape.triangles);
   shape.component_roots = find_component_roots(shape.topology, vertex_count);
   shape.mean_edge = mean_edge_length(shape.positions, shape.topology.edges);
+  shape.size = bounds_of(shape.positions).size().norm();
   shape.attached.assign(shape.positions.size(), 0);
   for (const int vertex : organ.attached) shape.attached[vertex] = 1;
   shape.mass.assign(shape.positions.size(), 1.0);

@@ -2,6 +2,7 @@
 
 #include "tissue_sim/geometry/aabb_tree.h"
 #include "tissue_sim/geometry/closest_point.h"
+#include "tissue_sim/geometry/pose.h"
 #include "tissue_sim/geometry/triangle_mesh.h"
 
 namespace tissue_sim {
@@ -21,6 +22,9 @@ struct InstrumentSurface {
 
 InstrumentSurface build_instrument_surface(const TriangleMesh& mesh, bool closed);
 
+/// The smallest box in the scene's frame that holds a box of the tip frame at `pose`.
+Box scene_bounds(const Box& box, const Pose& pose);
+
 /// The closest point of an instrument's surface, and which side of it p is on.
 struct ClosestFeature {
   Vector3 point;
@@ -29,7 +33,7 @@ struct ClosestFeature {
 };
 
 /// Exact depth and direction of p (tip frame). The sign is that of the pseudonormal at the closest feature; where p lies on
-/// the surface the direction is that normal.
+/// the surface the direction is that normal. A position that is not a number is outside, far away.
 ClosestFeature closest_feature(const InstrumentSurface& surface, const Vector3& p);
 
 }  // namespace tissue_sim

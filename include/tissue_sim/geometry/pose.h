@@ -17,4 +17,11 @@ inline Pose operator*(const Pose& parent, const Pose& child) {
   return {parent.apply(child.position), (parent.orientation * child.orientation).normalized()};
 }
 
+/// Position on the line, rotation by slerp over the shorter arc. The ends come out exactly.
+inline Pose interpolate(const Pose& from, const Pose& to, double fraction) {
+  if (fraction <= 0.0) return from;
+  if (fraction >= 1.0) return to;
+  return {from.position + fraction * (to.position - from.position), from.orientation.slerp(fraction, to.orientation)};
+}
+
 }  // namespace tissue_sim

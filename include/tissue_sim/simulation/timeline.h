@@ -6,59 +6,17 @@
 #include <string>
 #include <vector>
 
-#include "tissue_sim/contact/contact.h"
-#include "tissue_sim/geometry/pose.h"
 #include "tissue_sim/scene/scene.h"
+#include "tissue_sim/simulation/pose_track.h"
+#include "tissue_sim/simulation/step_report.h"
 
 namespace tissue_sim {
-
-/// Pose of an instrument's tip link in the scene's frame.
-struct StampedPose {
-  std::int64_t stamp = 0;  ///< ns
-  Pose pose;
-};
-
-enum class PoseVerdict { used, zero_stamp, non_finite, zero_quaternion, stale, new_run };
-constexpr int pose_verdicts = 6;
-const char* to_string(PoseVerdict verdict);
-
-/// Force and torque about the tip, on the instrument, scene frame; N and N m.
-struct Wrench {
-  Vector3 force = Vector3::Zero();
-  Vector3 torque = Vector3::Zero();
-};
-
-/// Wall time of the stages of one step, s, summed over its substeps.
-struct StepProfile {
-  double refit = 0.0;        ///< trees of what moved
-  double detection = 0.0;    ///< stage 1
-  double penetration = 0.0;  ///< stage 2
-  double propagation = 0.0;  ///< stage 3
-  double response = 0.0;
-  double deformation = 0.0;  ///< elements, integration, restoration
-  double health = 0.0;
-  double total = 0.0;
-};
-
-/// What one step did. Valid until the next one.
-struct StepReport {
-  std::uint64_t step = 0;       ///< counts from 1; never goes back, not even at a reset
-  std::int64_t stamp = 0;       ///< ns, the simulated time that the states show
-  bool pose_reached = false;    ///< the step ended on the stamp of a pose
-  bool state_due = false;       ///< state_period has passed since the last state that was due
-  bool recovered = false;       ///< the health check put the last good state back
-  int substeps = 0;
-  std::vector<Contact> contacts;
-  std::vector<Wrench> wrenches;  ///< one an instrument
-  std::vector<Pose> poses;       ///< one an instrument, at `stamp`; meaningful where `placed`
-  std::vector<char> placed;      ///< one an instrument: it has been given a pose
-  StepProfile profile;
-};
 
 struct TimelineOptions {
   std::int64_t state_period = 16'000'000;         ///< ns
   std::int64_t time_jump_threshold = 500'000'000;  ///< ns
   std::int64_t pose_timeout = 500'000'000;         ///< ns; an instrument this far behind the others is held, not waited for
+  std::int64_t longest_gap = 10'000'000'000;       ///< ns; poses farther apart than this start a new run
   bool newest_only = false;  ///< true: steps go to the newest pose and the ones before it are passed over
 };
 

@@ -17,6 +17,7 @@ struct RestShape {
   MeshTopology topology;
   std::vector<int> component_roots;  ///< the first vertex of each connected surface
   double mean_edge = 0.0;            ///< m
+  double size = 0.0;                 ///< m, diagonal of the bounding box
 
   std::vector<char> attached;        ///< 1: held at its rest place
   std::vector<double> mass;          ///< kg, with what the mass floor added; 1 for `contact_only`, which has no masses

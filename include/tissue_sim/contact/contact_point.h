@@ -1,0 +1,49 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "tissue_sim/contact/penetration.h"
+
+namespace tissue_sim {
+
+/// A point of an organ's surface and the plane of the instrument that it must not be behind: direction . x >= target.
+/// x is the weighted sum of up to three vertices: one for a colliding vertex, two for a point of an edge.
+struct ContactPoint {
+  int piece = 0;     ///< of the world's instrument pieces
+  int triangle = 0;  ///< of the organ; the vertices are its corners in the order of the weights
+  std::array<int, 3> vertices{};
+  Vector3 weights = Vector3::UnitX();
+  Vector3 direction = Vector3::UnitZ();            ///< scene frame, unit, out of the instrument
+  double target = 0.0;                             ///< m
+  Vector3 instrument_velocity = Vector3::Zero();   ///< m/s, of the instrument at the point
+  double impulse = 0.0;                            ///< N s along direction, on the organ; set by the response
+};
+
+/// m; what touches an instrument within this distance goes on touching, and points of triangles are kept this far out.
+constexpr double contact_margin = 0.02e-3;
+
+/// Colliding vertices, by the depths and directions of stages 2 and 3, then those of `touching` that are still within the margin.
+/// Refills `touching` with all of them, ascending.
+void add_vertex_contacts(const OrganSurface& organ, const InstrumentSurface& instrument, int piece, const Pose& pose,
+                         const Penetration& penetration, Detection& detection, std::vector<int>& touching,
+                         std::vector<ContactPoint>& points);
+
+/// Edges that go in and come out again between two vertices outside, at the middle of what is inside.
+void add_edge_contacts(const OrganSurface& organ, const InstrumentSurface& instrument, int piece, const Pose& pose,
+                       const Detection& detection, std::vector<ContactPoint>& points);
+
+/// How far instrument vertices are from the organ: a bound that motion uses up. Travel is a sum over all passes so far.
+struct Clearance {
+  double shift = 0.0;                ///< m, travel of the tip and of the organ's fastest vertex
+  double turn = 0.0;                 ///< rad
+  std::vector<double> free_until;    ///< m, per instrument vertex: nothing to look at before shift + turn * |vertex| reaches it
+};
+
+/// Instrument vertices below the organ's surface or within the margin above it: what pokes into a triangle without any organ vertex or
+/// edge being inside, as a tip thinner than a triangle does. With the two above that is every way two surfaces can cross: where
+/// no organ edge crosses the instrument, what reaches below a flat triangle has its lowest point at a vertex.
+void add_poke_contacts(const OrganSurface& organ, const InstrumentSurface& instrument, int piece, const Pose& pose,
+                       Clearance& clearance, std::vector<ContactPoint>& points);
+
+}  // namespace tissue_sim

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+
+#include "tissue_sim/geometry/pose.h"
+
+namespace tissue_sim {
+
+/// Pose of an instrument's tip link in the scene's frame.
+struct StampedPose {
+  std::int64_t stamp = 0;  ///< ns
+  Pose pose;
+};
+
+/// non_finite: not a number, or farther than 1 km from the scene's origin. stale: not later than the pose before it, but by no
+/// more than time_jump_threshold. new_run: taken as the first pose of a new run, since the stamps jumped.
+enum class PoseVerdict { used, zero_stamp, non_finite, zero_quaternion, stale, new_run };
+constexpr int pose_verdicts = 6;
+const char* to_string(PoseVerdict verdict);
+
+/// The poses of one instrument: where it is, and where it will be.
+struct PoseTrack {
+  bool placed = false;            ///< it has been given a pose that time has reached
+  Pose pose;                      ///< at the time the simulation has reached
+  std::int64_t newest = 0;        ///< ns, the last stamp that was taken; 0: none
+  std::deque<StampedPose> ahead;  ///< later than the time the simulation has reached
+};
+
+/// What a pose is worth in itself: `used`, or why not. Normalises the quaternion; `normalised` is set to true where that changed it
+/// by more than a thousandth.
+PoseVerdict judge_pose(StampedPose& pose, bool& normalised);
+
+}  // namespace tissue_sim

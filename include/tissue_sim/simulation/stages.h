@@ -1,0 +1,44 @@
+#pragma once
+
+#include "tissue_sim/simulation/step.h"
+
+namespace tissue_sim {
+
+/// What the stages of one organ's step share. Lives as long as the step.
+struct StepContext {
+  const World& world;
+  const Motion& motion;
+  int organ;
+  OrganState& state;
+  Workspace& workspace;
+  StepReport& report;
+  double dt = 0.0;  ///< s, of the substep
+
+  const OrganModel& model() const { return world.organs[organ]; }
+  OrganWorkspace& work() { return workspace.organs[organ]; }
+  OrganSurface surface() {
+    const RestShape& rest = model().rest;
+    return {state.positions, rest.triangles, rest.topology, rest.component_roots, work().tree};
+  }
+};
+
+void begin_report(const World& world, const Motion& motion, StepReport& report);
+
+/// As many as the elements need, and as many as keep an instrument near the organ from moving farther than the motion limit in one.
+int count_substeps(StepContext& context);
+
+void place_instruments(StepContext& context, int substep, int substeps);
+void refit(StepContext& context);
+void find_crossings(StepContext& context);
+void find_border_depths(StepContext& context);
+void propagate_depths(StepContext& context);
+void respond(StepContext& context);
+void deform(StepContext& context);
+
+/// Puts the last good state of the organ back, at rest, when a number is not finite or a vertex has run away.
+void check_health(StepContext& context);
+
+void report_contacts(StepContext& context);
+void end_report(StepReport& report);
+
+}  // namespace tissue_sim

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <vector>
+
+#include "tissue_sim/contact/contact_point.h"
+#include "tissue_sim/simulation/state.h"
+#include "tissue_sim/simulation/step_report.h"
+
+namespace tissue_sim {
+
+/// The way of one instrument in one step. Position goes in a line, rotation by slerp over the shorter arc.
+struct InstrumentMotion {
+  bool placed = false;  ///< false: it has no pose yet and is not there
+  Pose from;
+  Pose to;
+};
+
+/// What a step is given.
+struct Motion {
+  double duration = 0.0;  ///< s
+  std::vector<InstrumentMotion> instruments;
+};
+
+/// Room for one organ's step. Holds nothing that the next step reads but the tree and the clearances, which are bounds that only
+/// save work: without them the same bits come out.
+struct OrganWorkspace {
+  std::vector<Box> boxes;
+  AabbTree tree;                ///< of the organ's triangles, its boxes grown by `slack`
+  double slack = 0.0;           ///< m
+  double travel = 0.0;          ///< m, at most this far has any vertex gone since the tree was fitted
+  std::vector<Detection> detections;      ///< per piece
+  std::vector<Penetration> penetrations;  ///< per piece
+  std::vector<Clearance> clearances;      ///< per piece
+  std::vector<char> near;                 ///< per piece: its box and the organ's overlap in this substep
+  std::vector<ContactPoint> points;
+  std::vector<Vector3> forces;
+  std::vector<Vector3> gradient;
+  OrganState last_good;
+
+  std::vector<Contact> contacts;          ///< of the step, one a place that was pressed in any of its substeps
+  std::vector<int> contact_of;            ///< per place, into contacts, where contact_step is the current one
+  std::vector<std::uint64_t> contact_step;
+};
+
+struct Workspace {
+  std::vector<OrganWorkspace> organs;
+  std::vector<Pose> before;  ///< poses at the start and the end of the substep, one an instrument
+  std::vector<Pose> now;
+};
+
+Workspace build_workspace(const World& world);
+
+/// Forgets what the workspace knows of an organ's positions: after they were set from outside the step.
+void forget(OrganWorkspace& organ);
+
+/// One step. `report.step` and `report.stamp` are the caller's; everything else in the report is written.
+void step(const World& world, const Motion& motion, State& state, Workspace& workspace, StepReport& report);
+
+}  // namespace tissue_sim

@@ -1,0 +1,106 @@
+#include "tissue_sim/contact/contact_point.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace tissue_sim {
+
+namespace {
+
+/// A point of the organ pushed along `direction` (scene frame) until it reaches `place` (scene frame).
+ContactPoint contact_at(const OrganSurface& organ, int piece, int triangle, const Vector3& weights, const Vector3& place,
+                        const Vector3& direction) {
+  ContactPoint point;
+  point.piece = piece;
+  point.triangle = triangle;
+  point.vertices = organ.triangles[triangle];
+  point.weights = weights;
+  point.direction = direction;
+  point.target = direction.dot(place);
+  return point;
+}
+
+ContactPoint vertex_contact(const OrganSurface& organ, int piece, int vertex, const Vector3& place,
+                            const Vector3& direction) {
+  const int triangle = *organ.topology.vertex_triangles.begin(vertex);
+  Vector3 weights = Vector3::Zero();
+  for (int i = 0; i < 3; ++i) weights[i] = organ.triangles[triangle][i] == vertex ? 1.0 : 0.0;
+  return contact_at(organ, piece, triangle, weights, place, direction);
+}
+
+}  // namespace
+
+void add_vertex_contacts(const OrganSurface& organ, const InstrumentSurface& instrument, int piece, const Pose& pose,
+                         const Penetration& penetration, Detection& detection, std::vector<int>& touching,
+                         std::vector<ContactPoint>& points) {
+  for (const int vertex : detection.colliding) {
+    const Vector3 direction = pose.orientation * penetration.direction[vertex];
+    const Vector3 place = organ.positions[vertex] + penetration.depth[vertex] * direction;
+    points.push_back(vertex_contact(organ, piece, vertex, place, direction));
+  }
+
+  // What the last response put on the surface need not be inside yet, and presses all the same.
+  detection.stack.clear();
+  for (const int vertex : touching) {
+    if (std::binary_search(detection.colliding.begin(), detection.colliding.end(), vertex)) continue;
+    const ClosestFeature closest = closest_feature(instrument, local_position(detection, organ, pose, vertex));
+    if (!(std::abs(closest.depth) < contact_margin)) continue;
+    points.push_back(vertex_contact(organ, piece, vertex, pose.apply(closest.point), pose.orientation * closest.direction));
+    detection.stack.push_back(vertex);
+  }
+  touching.resize(detection.colliding.size() + detection.stack.size());
+  std::merge(detection.colliding.begin(), detection.colliding.end(), detection.stack.begin(), detection.stack.end(),
+             touching.begin());
+}
+
+void add_edge_contacts(const OrganSurface& organ, const InstrumentSurface& instrument, int piece, const Pose& pose,
+                       const Detection& detection, std::vector<ContactPoint>& points) {
+  for (const CrossedEdge& crossed : detection.crossed_edges) {
+    const auto& [first, last] = organ.topology.edges[crossed.edge];
+    if (detection.side[first] != Side::outside || detection.side[last] != Side::outside) continue;
+    for (int i = crossed.first; i + 1 < crossed.first + crossed.count; i += 2) {
+      const double t = 0.5 * (detection.crossings[i].t + detection.crossings[i + 1].t);
+      const Vector3 middle = detection.local[first] + t * (detection.local[last] - detection.local[first]);
+      const ClosestFeature closest = closest_feature(instrument, middle);
+      if (!(closest.depth > 0.0)) continue;
+      const int triangle = organ.topology.edge_triangles[crossed.edge][0];
+      Vector3 weights = Vector3::Zero();
+      for (int corner = 0; corner < 3; ++corner) {
+        if (organ.triangles[triangle][corner] == first) weights[corner] = 1.0 - t;
+        if (organ.triangles[triangle][corner] == last) weights[corner] = t;
+      }
+      points.push_back(contact_at(organ, piece, triangle, weights, pose.apply(closest.point),
+                                  pose.orientation * closest.direction));
+    }
+  }
+}
+
+void add_poke_contacts(const OrganSurface& organ, const InstrumentSurface& instrument, int piece, const Pose& pose,
+                       Clearance& clearance, std::vector<ContactPoint>& points) {
+  for (std::size_t u = 0; u < instrument.vertices.size(); ++u) {
+    const double travelled = clearance.shift + clearance.turn * instrument.vertices[u].norm();
+    if (travelled < clearance.free_until[u]) continue;
+
+    const Vector3 tip = pose.apply(instrument.vertices[u]);
+    const ClosestOnMesh closest =
+        closest_on_mesh(organ.positions, organ.triangles, organ.tree, tip, std::numeric_limits<double>::max());
+    if (closest.triangle < 0) continue;  // a position that is not a number is near nothing
+    const double distance = std::sqrt(closest.squared_distance);
+    clearance.free_until[u] = travelled + distance - contact_margin;
+    const Vector3 outward =
+        pseudonormal(organ.positions, organ.triangles, organ.topology, closest.triangle, closest.on.feature);
+    const Vector3 above = tip - closest.on.point;
+    const bool below_surface = !(above.dot(outward) > 0.0);
+    if (!below_surface && !(distance < contact_margin)) continue;
+
+    clearance.free_until[u] = travelled;
+    const Vector3 direction = distance < 1e-9   ? Vector3(-outward.stableNormalized())
+                              : below_surface ? Vector3(above / distance)
+                                              : Vector3(-above / distance);
+    points.push_back(contact_at(organ, piece, closest.triangle, closest.on.barycentric, tip + contact_margin * direction,
+                                direction));
+  }
+}
+
+}  // namespace tissue_sim

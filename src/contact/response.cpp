@@ -1,0 +1,69 @@
+#include "tissue_sim/contact/response.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tissue_sim {
+
+namespace {
+
+/// Points that share vertices disturb each other; this many rounds leave less than the contact margin.
+constexpr int rounds = 8;
+
+/// sum w_i^2 / m_i: how easily the point moves. 0 where all its vertices are attached.
+double mobility(const ContactPoint& point, const std::vector<double>& inverse_mass) {
+  double sum = 0.0;
+  for (int i = 0; i < 3; ++i) sum += point.weights[i] * point.weights[i] * inverse_mass[point.vertices[i]];
+  return sum;
+}
+
+Vector3 at_point(const ContactPoint& point, const std::vector<Vector3>& of_vertices) {
+  return point.weights[0] * of_vertices[point.vertices[0]] + point.weights[1] * of_vertices[point.vertices[1]] +
+         point.weights[2] * of_vertices[point.vertices[2]];
+}
+
+}  // namespace
+
+double push_out(const std::vector<ContactPoint>& points, const std::vector<double>& inverse_mass,
+                std::vector<Vector3>& positions, std::vector<char>* held) {
+  double farthest = 0.0;
+  for (int round = 0; round < rounds; ++round) {
+    double farthest_of_round = 0.0;
+    for (const ContactPoint& point : points) {
+      const double behind = point.target - point.direction.dot(at_point(point, positions));
+      const double ease = mobility(point, inverse_mass);
+      if (!(behind > 0.0) || !(ease > 0.0)) continue;
+      for (int i = 0; i < 3; ++i) {
+        const int vertex = point.vertices[i];
+        const double way = behind * point.weights[i] * inverse_mass[vertex] / ease;
+        if (!(way > 0.0)) continue;
+        positions[vertex] += way * point.direction;
+        if (held) (*held)[vertex] = 1;
+        farthest_of_round = std::max(farthest_of_round, way);
+      }
+    }
+    farthest += farthest_of_round;
+    if (!(farthest_of_round > 0.01 * contact_margin)) break;
+  }
+  return farthest;
+}
+
+void stop_at_instrument(std::vector<ContactPoint>& points, const std::vector<double>& inverse_mass,
+                        std::vector<Vector3>& velocities) {
+  for (ContactPoint& point : points) point.impulse = 0.0;
+  for (int round = 0; round < rounds; ++round) {
+    for (ContactPoint& point : points) {
+      const double ease = mobility(point, inverse_mass);
+      if (!(ease > 0.0)) continue;
+      const double approach = point.direction.dot(point.instrument_velocity - at_point(point, velocities));
+      const double impulse = std::max(0.0, point.impulse + approach / ease);
+      const Vector3 change = (impulse - point.impulse) * point.direction;
+      for (int i = 0; i < 3; ++i) {
+        velocities[point.vertices[i]] += point.weights[i] * inverse_mass[point.vertices[i]] * change;
+      }
+      point.impulse = impulse;
+    }
+  }
+}
+
+}  // namespace tissue_sim

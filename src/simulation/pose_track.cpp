@@ -1,0 +1,38 @@
+#include "tissue_sim/simulation/pose_track.h"
+
+#include <cmath>
+
+namespace tissue_sim {
+
+namespace {
+constexpr double farthest = 1000.0;        ///< m from the scene's origin
+constexpr double shortest_quaternion = 1e-6;
+constexpr double off_unit_length = 1e-3;   ///< of a quaternion: rounding and drift stay well below
+}  // namespace
+
+const char* to_string(PoseVerdict verdict) {
+  switch (verdict) {
+    case PoseVerdict::used: return "used";
+    case PoseVerdict::zero_stamp: return "zero stamp";
+    case PoseVerdict::non_finite: return "non-finite";
+    case PoseVerdict::zero_quaternion: return "zero quaternion";
+    case PoseVerdict::stale: return "stale";
+    case PoseVerdict::new_run: return "new run";
+  }
+  return "";
+}
+
+PoseVerdict judge_pose(StampedPose& pose, bool& normalised) {
+  if (pose.stamp <= 0) return PoseVerdict::zero_stamp;
+  Eigen::Vector4d& q = pose.pose.orientation.coeffs();
+  if (!pose.pose.position.allFinite() || !q.allFinite()) return PoseVerdict::non_finite;
+  if (!(pose.pose.position.cwiseAbs().maxCoeff() <= farthest)) return PoseVerdict::non_finite;
+  const double largest = q.cwiseAbs().maxCoeff();
+  if (!(largest > shortest_quaternion)) return PoseVerdict::zero_quaternion;
+  normalised = std::abs(q.stableNorm() - 1.0) > off_unit_length;
+  q /= largest;  // squares of 1e300 would overflow
+  q.normalize();
+  return PoseVerdict::used;
+}
+
+}  // namespace tissue_sim

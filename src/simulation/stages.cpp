@@ -1,0 +1,356 @@
+#include "tissue_sim/simulation/stages.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "tissue_sim/contact/propagation.h"
+#include "tissue_sim/contact/response.h"
+#include "tissue_sim/simulation/health.h"
+#include "tissue_sim/simulation/integrator.h"
+
+namespace tissue_sim {
+
+namespace {
+
+/// More cuts than this for one step is a jump, not a motion (60 m/s with 1 ms steps on 2 mm edges): it is not swept.
+constexpr int most_motion_substeps = 300;
+
+/// m/s. An untouched organ whose fastest vertex is slower goes to sleep: what is left to move is far below a micrometre.
+constexpr double sleep_speed = 1e-7;
+
+/// Of a mean edge: how much the boxes of an organ's tree are grown, so that it is refitted after that much motion only.
+constexpr double slack_fraction = 0.2;
+
+/// Adds the time from here to the end of the scope to a stage of the profile.
+class Lap {
+ public:
+  explicit Lap(double& stage) : stage_(stage), start_(std::chrono::steady_clock::now()) {}
+  ~Lap() { stage_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+  Lap(const Lap&) = delete;
+  Lap& operator=(const Lap&) = delete;
+
+ private:
+  double& stage_;
+  std::chrono::steady_clock::time_point start_;
+};
+
+double angle_between(const Pose& a, const Pose& b) { return a.orientation.angularDistance(b.orientation); }
+
+void fit_tree(const OrganModel& model, const OrganState& state, OrganWorkspace& work) {
+  for (std::size_t t = 0; t < work.boxes.size(); ++t) {
+    Box box;
+    for (const int v : model.rest.triangles[t]) box.add(state.positions[v]);
+    work.boxes[t] = box.grown(work.slack);
+  }
+  work.tree.refit(work.boxes);
+  work.travel = 0.0;
+}
+
+Vector3 velocity_of(const Pose& before, const Pose& now, const Vector3& point, double dt) {
+  return (point - before.apply(now.apply_inverse(point))) / dt;
+}
+
+/// The same place of the organ has the same number in every substep of a step: its vertex, or its triangle behind all vertices.
+std::size_t place_of(const ContactPoint& point, std::size_t vertices) {
+  for (int i = 0; i < 3; ++i) {
+    if (point.weights[i] >= 1.0) return static_cast<std::size_t>(point.vertices[i]);
+  }
+  return vertices + static_cast<std::size_t>(point.triangle);
+}
+
+void record_contact(StepContext& context, const ContactPoint& point) {
+  OrganWorkspace& work = context.work();
+  const std::size_t vertices = context.state.positions.size();
+  const std::size_t places = vertices + context.model().rest.triangles.size();
+  const std::size_t place = static_cast<std::size_t>(point.piece) * places + place_of(point, vertices);
+  if (work.contact_step[place] != context.report.step) {
+    work.contact_step[place] = context.report.step;
+    work.contact_of[place] = static_cast<int>(work.contacts.size());
+    work.contacts.emplace_back();
+    work.contacts.back().force.setZero();
+  }
+  const InstrumentPiece& piece = context.world.pieces[point.piece];
+  Contact& contact = work.contacts[work.contact_of[place]];
+  contact.organ = context.organ;
+  contact.instrument = piece.instrument;
+  contact.part = piece.part;
+  contact.triangle = point.triangle;
+  contact.barycentric = point.weights;
+  contact.direction = point.direction;
+  contact.depth = point.target;  // turned into a depth when the step ends
+  contact.force += point.impulse / context.motion.duration * point.direction;
+}
+
+void push_on_instrument(StepContext& context, const ContactPoint& point) {
+  const int instrument = context.world.pieces[point.piece].instrument;
+  Vector3 place = Vector3::Zero();
+  for (int i = 0; i < 3; ++i) place += point.weights[i] * context.state.positions[point.vertices[i]];
+  const Vector3 force = -point.impulse / context.motion.duration * point.direction;
+  Wrench& wrench = context.report.wrenches[instrument];
+  wrench.force += force;
+  wrench.torque += (place - context.workspace.now[instrument].position).cross(force);
+}
+
+}  // namespace
+
+Workspace build_workspace(const World& world) {
+  Workspace workspace;
+  workspace.before.resize(static_cast<std::size_t>(world.instruments));
+  workspace.now.resize(static_cast<std::size_t>(world.instruments));
+  for (std::size_t organ = 0; organ < world.organs.size(); ++organ) {
+    const OrganModel& model = world.organs[organ];
+    const RestShape& rest = model.rest;
+    OrganWorkspace& work = workspace.organs.emplace_back();
+    work.slack = slack_fraction * rest.mean_edge;
+    work.boxes.resize(rest.triangles.size());
+    for (std::size_t t = 0; t < rest.triangles.size(); ++t) {
+      for (const int v : rest.triangles[t]) work.boxes[t].add(rest.positions[v]);
+    }
+    work.tree.build(work.boxes);
+    work.detections.resize(world.pieces.size());
+    work.penetrations.resize(world.pieces.size());
+    work.clearances.resize(world.pieces.size());
+    work.near.assign(world.pieces.size(), 0);
+    const OrganSurface surface = {rest.positions, rest.triangles, rest.topology, rest.component_roots, work.tree};
+    for (std::size_t p = 0; p < world.pieces.size(); ++p) {
+      prepare(work.detections[p], surface);
+      prepare(work.penetrations[p], surface);
+      work.clearances[p].free_until.assign(world.pieces[p].surface.vertices.size(), 0.0);
+    }
+    work.forces.assign(rest.positions.size(), Vector3::Zero());
+    work.gradient.assign(rest.positions.size(), Vector3::Zero());
+    const std::size_t places = world.pieces.size() * (rest.positions.size() + rest.triangles.size());
+    work.contact_of.assign(places, 0);
+    work.contact_step.assign(places, 0);
+    work.last_good = rest_state(world, static_cast<int>(organ));
+    forget(work);
+  }
+  return workspace;
+}
+
+void forget(OrganWorkspace& work) {
+  work.travel = 1e300;
+  for (Clearance& clearance : work.clearances) {
+    std::fill(clearance.free_until.begin(), clearance.free_until.end(), 0.0);
+    clearance.shift = 0.0;
+    clearance.turn = 0.0;
+  }
+}
+
+void begin_report(const World& world, const Motion& motion, StepReport& report) {
+  report.profile = StepProfile();
+  report.recovered = false;
+  report.substeps = 0;
+  report.contacts.clear();
+  report.wrenches.assign(static_cast<std::size_t>(world.instruments), Wrench());
+  report.poses.resize(static_cast<std::size_t>(world.instruments));
+  report.placed.resize(static_cast<std::size_t>(world.instruments));
+  for (std::size_t i = 0; i < motion.instruments.size(); ++i) {
+    report.poses[i] = motion.instruments[i].to;
+    report.placed[i] = motion.instruments[i].placed ? 1 : 0;
+  }
+}
+
+int count_substeps(StepContext& context) {
+  OrganWorkspace& work = context.work();
+  work.contacts.clear();
+  for (std::size_t i = 0; i < context.motion.instruments.size(); ++i) {
+    context.workspace.now[i] = context.motion.instruments[i].from;
+  }
+
+  const OrganModel& model = context.model();
+  double farthest = 0.0;
+  bool near = false;
+  for (const InstrumentPiece& piece : context.world.pieces) {
+    const InstrumentMotion& motion = context.motion.instruments[piece.instrument];
+    if (!motion.placed) continue;
+    const double way = (motion.to.position - motion.from.position).norm() +
+                       angle_between(motion.from, motion.to) * piece.surface.reach;
+    Box swept = scene_bounds(piece.surface.bounds, motion.from);
+    swept.add(scene_bounds(piece.surface.bounds, motion.to));
+    // Between the two a rotation can leave both boxes by no more than the whole way.
+    if (!swept.grown(way).overlaps(work.tree.bounds().grown(work.travel))) continue;
+    farthest = std::max(farthest, way);
+    near = true;
+  }
+  const double cuts = std::ceil(farthest / model.motion_limit);
+  const int for_motion = cuts <= most_motion_substeps ? static_cast<int>(cuts) : 1;
+  const int for_elements = context.state.asleep && !near ? 1 : substeps_for(model.rest, context.motion.duration);
+  const int substeps = std::max({1, for_motion, for_elements});
+  context.dt = context.motion.duration / substeps;
+  context.report.substeps = std::max(context.report.substeps, substeps);
+  return substeps;
+}
+
+void place_instruments(StepContext& context, int substep, int substeps) {
+  const double fraction = static_cast<double>(substep) / substeps;
+  Workspace& workspace = context.workspace;
+  workspace.before = workspace.now;
+  for (std::size_t i = 0; i < workspace.now.size(); ++i) {
+    const InstrumentMotion& motion = context.motion.instruments[i];
+    workspace.now[i] = interpolate(motion.from, motion.to, fraction);
+  }
+  for (std::size_t p = 0; p < context.world.pieces.size(); ++p) {
+    const int instrument = context.world.pieces[p].instrument;
+    Clearance& clearance = context.work().clearances[p];
+    clearance.shift += (workspace.now[instrument].position - workspace.before[instrument].position).norm();
+    clearance.turn += angle_between(workspace.before[instrument], workspace.now[instrument]);
+  }
+}
+
+void refit(StepContext& context) {
+  const Lap lap(context.report.profile.refit);
+  OrganWorkspace& work = context.work();
+  bool any_near = false;
+  for (std::size_t p = 0; p < context.world.pieces.size(); ++p) {
+    const InstrumentPiece& piece = context.world.pieces[p];
+    const bool placed = context.motion.instruments[piece.instrument].placed;
+    const Box box = scene_bounds(piece.surface.bounds, context.workspace.now[piece.instrument]).grown(contact_margin);
+    work.near[p] = placed && box.overlaps(work.tree.bounds().grown(work.travel)) ? 1 : 0;
+    any_near = any_near || work.near[p] != 0;
+  }
+  if (any_near && work.travel > work.slack) fit_tree(context.model(), context.state, work);
+}
+
+void find_crossings(StepContext& context) {
+  const Lap lap(context.report.profile.detection);
+  OrganWorkspace& work = context.work();
+  work.points.clear();
+  const OrganSurface surface = context.surface();
+  for (std::size_t p = 0; p < context.world.pieces.size(); ++p) {
+    const InstrumentPiece& piece = context.world.pieces[p];
+    // What collides by the paper's memory alone goes on colliding while the instrument is away.
+    if (!work.near[p] && context.model().colliding_set == CollidingSet::flood) {
+      context.state.touching[p].clear();
+      work.detections[p].colliding.clear();
+      continue;
+    }
+    detect(surface, piece.surface, context.workspace.now[piece.instrument], context.model().colliding_set,
+           context.state.colliding[p], work.detections[p]);
+    work.near[p] = 1;
+  }
+}
+
+void find_border_depths(StepContext& context) {
+  const Lap lap(context.report.profile.penetration);
+  OrganWorkspace& work = context.work();
+  const OrganSurface surface = context.surface();
+  for (std::size_t p = 0; p < context.world.pieces.size(); ++p) {
+    if (!work.near[p]) continue;
+    const InstrumentSurface& instrument = context.world.pieces[p].surface;
+    if (context.model().depth == DepthScheme::paper) {
+      penetrate_border(surface, instrument, work.detections[p], work.penetrations[p]);
+    } else {
+      penetrate_exactly(instrument, work.detections[p], work.penetrations[p]);
+    }
+  }
+}
+
+void propagate_depths(StepContext& context) {
+  if (context.model().depth != DepthScheme::paper) return;
+  const Lap lap(context.report.profile.propagation);
+  OrganWorkspace& work = context.work();
+  const OrganSurface surface = context.surface();
+  for (std::size_t p = 0; p < context.world.pieces.size(); ++p) {
+    if (!work.near[p]) continue;
+    propagate(surface, context.world.pieces[p].surface, work.detections[p], work.penetrations[p]);
+  }
+}
+
+void respond(StepContext& context) {
+  const Lap lap(context.report.profile.response);
+  OrganWorkspace& work = context.work();
+  const RestShape& rest = context.model().rest;
+  const OrganSurface surface = context.surface();
+  for (std::size_t p = 0; p < context.world.pieces.size(); ++p) {
+    if (!work.near[p]) continue;
+    const InstrumentPiece& piece = context.world.pieces[p];
+    const int index = static_cast<int>(p);
+    const Pose& pose = context.workspace.now[piece.instrument];
+    add_vertex_contacts(surface, piece.surface, index, pose, work.penetrations[p], work.detections[p],
+                        context.state.touching[p], work.points);
+    add_edge_contacts(surface, piece.surface, index, pose, work.detections[p], work.points);
+    add_poke_contacts(surface, piece.surface, index, pose, work.clearances[p], work.points);
+  }
+  if (work.points.empty()) return;
+
+  context.state.asleep = context.state.asleep && !rest.elastic();
+  for (ContactPoint& point : work.points) {
+    const int instrument = context.world.pieces[point.piece].instrument;
+    Vector3 place = Vector3::Zero();
+    for (int i = 0; i < 3; ++i) place += point.weights[i] * context.state.positions[point.vertices[i]];
+    point.instrument_velocity =
+        velocity_of(context.workspace.before[instrument], context.workspace.now[instrument], place, context.dt);
+  }
+  std::vector<char>* held = context.model().restoration ? nullptr : &context.state.held;
+  const double way = push_out(work.points, rest.inverse_mass, context.state.positions, held);
+  if (rest.elastic()) stop_at_instrument(work.points, rest.inverse_mass, context.state.velocities);
+  work.travel += way;
+  for (Clearance& clearance : work.clearances) clearance.shift += way;
+  for (const ContactPoint& point : work.points) {
+    record_contact(context, point);
+    push_on_instrument(context, point);
+  }
+}
+
+void deform(StepContext& context) {
+  const OrganModel& model = context.model();
+  if (!model.rest.elastic() || context.state.asleep) return;
+  const Lap lap(context.report.profile.deformation);
+  OrganWorkspace& work = context.work();
+  element_forces(model.rest, context.state, work.forces, work.gradient);
+  const double speed = integrate(model, context.world.gravity, context.dt, work.forces, context.state);
+  work.travel += context.dt * speed;
+  for (Clearance& clearance : work.clearances) clearance.shift += context.dt * speed;
+  if (work.points.empty() && speed < sleep_speed) {
+    context.state.asleep = true;
+    std::fill(context.state.velocities.begin(), context.state.velocities.end(), Vector3::Zero());
+  }
+}
+
+void check_health(StepContext& context) {
+  const Lap lap(context.report.profile.health);
+  OrganWorkspace& work = context.work();
+  if (context.state.asleep && work.contacts.empty()) return;
+  if (healthy(context.model().rest, context.state)) {
+    work.last_good = context.state;
+    return;
+  }
+  context.state = work.last_good;
+  std::fill(context.state.velocities.begin(), context.state.velocities.end(), Vector3::Zero());
+  work.contacts.clear();
+  forget(work);
+  for (Wrench& wrench : context.report.wrenches) wrench = Wrench();
+  context.report.recovered = true;
+}
+
+void report_contacts(StepContext& context) {
+  OrganWorkspace& work = context.work();
+  std::fill(context.state.depths.begin(), context.state.depths.end(), 0.0);
+  for (Contact& contact : work.contacts) {
+    const Triangle& corners = context.model().rest.triangles[contact.triangle];
+    Vector3 rest = Vector3::Zero();
+    contact.point.setZero();
+    for (int i = 0; i < 3; ++i) {
+      contact.point += contact.barycentric[i] * context.state.positions[corners[i]];
+      rest += contact.barycentric[i] * context.model().rest.positions[corners[i]];
+    }
+    // How far it was pushed, and what is left of the instrument below it where it could not be pushed all the way.
+    const double target = contact.depth;
+    const double reached = contact.direction.dot(contact.point);
+    contact.depth = std::max(0.0, std::max(target, reached) - contact.direction.dot(rest));
+    for (int i = 0; i < 3; ++i) {
+      double& depth = context.state.depths[corners[i]];
+      depth = std::max(depth, contact.barycentric[i] * contact.depth);
+    }
+    context.report.contacts.push_back(contact);
+  }
+}
+
+void end_report(StepReport& report) {
+  StepProfile& p = report.profile;
+  p.total = p.refit + p.detection + p.penetration + p.propagation + p.response + p.deformation + p.health;
+}
+
+}  // namespace tissue_sim

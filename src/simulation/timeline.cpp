@@ -1,0 +1,282 @@
+#include "tissue_sim/simulation/timeline.h"
+
+#include <algorithm>
+
+#include "tissue_sim/simulation/integrator.h"
+#include "tissue_sim/simulation/step.h"
+
+namespace tissue_sim {
+
+namespace {
+
+constexpr double nanosecond = 1e-9;
+
+std::int64_t in_nanoseconds(double seconds) { return static_cast<std::int64_t>(seconds / nanosecond + 0.5); }
+
+/// The way from one stamp to the next, cut into steps that are equal to within a nanosecond.
+struct Segment {
+  std::int64_t begin = 0;
+  std::int64_t end = 0;
+  std::int64_t steps = 0;
+  std::int64_t done = 0;
+  std::vector<Pose> from;  ///< one an instrument
+  std::vector<Pose> to;
+
+  bool over() const { return done == steps; }
+  std::int64_t stamp_after(std::int64_t step) const {
+    const std::int64_t length = end - begin;
+    return begin + length / steps * step + length % steps * step / steps;
+  }
+};
+
+}  // namespace
+
+struct Timeline::Impl {
+  Impl(const Scene& scene, const TimelineOptions& given)
+      : world(build_world(scene)), options(given), workspace(build_workspace(world)), state(rest_state(world)) {
+    longest_step = in_nanoseconds(scene.time_step);
+    tracks.resize(static_cast<std::size_t>(world.instruments));
+    motion.instruments.resize(tracks.size());
+    report.wrenches.resize(tracks.size());
+    report.poses.resize(tracks.size());
+    report.placed.assign(tracks.size(), 0);
+  }
+
+  PoseVerdict take(int instrument, StampedPose pose);
+  void start_run(int instrument, const StampedPose& first);
+  bool next_segment();
+  void begin_segment(std::int64_t end);
+  void make_step();
+  void reset_organ(int organ);
+
+  const World world;
+  const TimelineOptions options;
+  Workspace workspace;
+  State state;
+  StepReport report;
+  TimelineCounters counters;
+  std::vector<PoseTrack> tracks;
+  Segment segment;
+  Motion motion;
+  std::int64_t longest_step = 0;
+  std::int64_t now = 0;  ///< ns; 0: no pose yet
+  std::int64_t last_state = 0;
+  std::uint64_t hash = 0;
+};
+
+PoseVerdict Timeline::Impl::take(int instrument, StampedPose pose) {
+  bool normalised = false;
+  const PoseVerdict verdict = judge_pose(pose, normalised);
+  if (verdict != PoseVerdict::used) return verdict;
+  if (normalised) ++counters.normalised_quaternions;
+
+  PoseTrack& track = tracks[instrument];
+  const std::int64_t before = std::max(track.newest, track.newest > 0 ? now : 0);
+  if (now == 0) {
+    start_run(instrument, pose);
+    return PoseVerdict::used;
+  }
+  if (before - pose.stamp > options.time_jump_threshold || pose.stamp - now > options.longest_gap) {
+    start_run(instrument, pose);
+    return PoseVerdict::new_run;
+  }
+  if (pose.stamp <= before) return PoseVerdict::stale;
+  track.newest = pose.stamp;
+  if (pose.stamp <= now) {  // an instrument that joins late: it is there from now on
+    track.placed = true;
+    track.pose = pose.pose;
+    return PoseVerdict::used;
+  }
+  if (options.newest_only) {
+    counters.poses_superseded += track.ahead.size();
+    track.ahead.clear();
+  }
+  track.ahead.push_back(pose);
+  return PoseVerdict::used;
+}
+
+/// The first step of a run ends on its first pose, with the instrument standing there.
+void Timeline::Impl::start_run(int instrument, const StampedPose& first) {
+  if (now != 0) {
+    for (std::size_t organ = 0; organ < state.organs.size(); ++organ) reset_organ(static_cast<int>(organ));
+    for (PoseTrack& track : tracks) track = PoseTrack();
+  }
+  tracks[instrument].placed = true;
+  tracks[instrument].pose = first.pose;
+  tracks[instrument].newest = first.stamp;
+  now = std::max<std::int64_t>(first.stamp - longest_step, 1);
+  last_state = 0;
+  begin_segment(std::max(first.stamp, now + 1));
+}
+
+/// The next stamp to go to is the earliest that lies ahead, once every instrument has said where it will be or is too late to wait for.
+bool Timeline::Impl::next_segment() {
+  std::int64_t earliest = 0;
+  std::int64_t newest = 0;
+  for (const PoseTrack& track : tracks) {
+    newest = std::max(newest, track.newest);
+    if (track.ahead.empty()) continue;
+    if (earliest == 0 || track.ahead.front().stamp < earliest) earliest = track.ahead.front().stamp;
+  }
+  if (earliest == 0) return false;
+  for (const PoseTrack& track : tracks) {
+    if (track.placed && track.ahead.empty() && newest - track.newest < options.pose_timeout) return false;
+  }
+  begin_segment(earliest);
+  return true;
+}
+
+void Timeline::Impl::begin_segment(std::int64_t end) {
+  segment.begin = now;
+  segment.end = end;
+  segment.steps = (end - now + longest_step - 1) / longest_step;
+  segment.done = 0;
+  segment.from.clear();
+  segment.to.clear();
+  for (const PoseTrack& track : tracks) {
+    segment.from.push_back(track.pose);
+    // Part of the way to a pose that lies behind the end of the segment.
+    Pose to = track.pose;
+    if (track.placed && !track.ahead.empty()) {
+      const StampedPose& next = track.ahead.front();
+      const double part = static_cast<double>(end - now) / static_cast<double>(next.stamp - now);
+      to = interpolate(track.pose, next.pose, part);
+    }
+    segment.to.push_back(to);
+  }
+}
+
+void Timeline::Impl::make_step() {
+  const double before = static_cast<double>(segment.done) / static_cast<double>(segment.steps);
+  ++segment.done;
+  const double after = static_cast<double>(segment.done) / static_cast<double>(segment.steps);
+  const std::int64_t stamp = segment.stamp_after(segment.done);
+  motion.duration = static_cast<double>(stamp - now) * nanosecond;
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    motion.instruments[i].placed = tracks[i].placed;
+    motion.instruments[i].from = interpolate(segment.from[i], segment.to[i], before);
+    motion.instruments[i].to = interpolate(segment.from[i], segment.to[i], after);
+    tracks[i].pose = motion.instruments[i].to;
+  }
+  now = stamp;
+  ++report.step;
+  report.stamp = stamp;
+  tissue_sim::step(world, motion, state, workspace, report);
+  if (report.recovered) ++counters.recoveries;
+
+  report.pose_reached = false;
+  for (std::size_t i = 0; segment.over() && i < tracks.size(); ++i) {
+    PoseTrack& track = tracks[i];
+    report.pose_reached = report.pose_reached || track.newest == stamp;
+    if (track.ahead.empty() || track.ahead.front().stamp > stamp) continue;
+    track.placed = true;
+    track.pose = track.ahead.front().pose;
+    track.ahead.pop_front();
+    report.pose_reached = true;
+  }
+
+  // Tied to a pose wherever poses come often enough; between poses that are far apart, where another state still fits before the next.
+  const bool period_over = last_state == 0 || stamp - last_state >= options.state_period;
+  const bool fits_before_pose = segment.end - stamp >= options.state_period;
+  report.state_due = period_over && (segment.over() || fits_before_pose);
+  if (report.state_due) last_state = stamp;
+
+  hash = hash_word(report.step, hash);
+  hash = hash_word(static_cast<std::uint64_t>(stamp), hash);
+  for (const OrganState& organ : state.organs) {
+    if (!organ.asleep || !report.contacts.empty()) hash = hash_state(organ, hash);
+  }
+}
+
+void Timeline::Impl::reset_organ(int organ) {
+  state.organs[organ] = rest_state(world, organ);
+  workspace.organs[organ].last_good = state.organs[organ];
+  forget(workspace.organs[organ]);
+  hash = hash_state(state.organs[organ], hash);
+  ++counters.resets;
+}
+
+Timeline::Timeline(const Scene& scene, const TimelineOptions& options) : impl_(std::make_unique<Impl>(scene, options)) {}
+Timeline::~Timeline() = default;
+
+PoseVerdict Timeline::add_pose(int instrument, const StampedPose& pose) {
+  const PoseVerdict verdict = impl_->take(instrument, pose);
+  ++impl_->counters.poses[static_cast<std::size_t>(verdict)];
+  return verdict;
+}
+
+bool Timeline::step() {
+  if (impl_->segment.over() && !impl_->next_segment()) return false;
+  impl_->make_step();
+  return true;
+}
+
+bool Timeline::step_holding(std::int64_t until) {
+  if (step()) return true;
+  if (impl_->now == 0 || impl_->now + impl_->longest_step > until) return false;
+  impl_->begin_segment(impl_->now + impl_->longest_step);
+  impl_->make_step();
+  return true;
+}
+
+void Timeline::reset(int organ) {
+  for (std::size_t i = 0; i < impl_->state.organs.size(); ++i) {
+    if (organ < 0 || organ == static_cast<int>(i)) impl_->reset_organ(static_cast<int>(i));
+  }
+}
+
+const StepReport& Timeline::report() const { return impl_->report; }
+
+OrganView Timeline::organ(int index) const {
+  return {impl_->state.organs[index].positions, impl_->state.organs[index].depths};
+}
+
+OrganSummary Timeline::summary(int organ) const {
+  const RestShape& rest = impl_->world.organs[organ].rest;
+  OrganSummary summary;
+  summary.vertices = static_cast<int>(rest.positions.size());
+  summary.triangles = static_cast<int>(rest.triangles.size());
+  summary.attached = static_cast<int>(std::count(rest.attached.begin(), rest.attached.end(), 1));
+  summary.distance_elements = static_cast<int>(rest.distances.size());
+  summary.area_elements = static_cast<int>(rest.areas.size());
+  summary.volume_elements = static_cast<int>(rest.flaps.size()) + (rest.enclosed.stiffness > 0.0 ? 1 : 0);
+  summary.mass = rest.total_mass;
+  summary.added_mass = rest.added_mass;
+  summary.stable_substep = rest.stable_substep;
+  summary.substeps = substeps_for(rest, impl_->world.time_step);
+  return summary;
+}
+
+const TimelineCounters& Timeline::counters() const { return impl_->counters; }
+std::uint64_t Timeline::hash() const { return impl_->hash; }
+std::int64_t Timeline::now() const { return impl_->now; }
+
+double Timeline::kinetic_energy() const {
+  double energy = 0.0;
+  for (std::size_t o = 0; o < impl_->state.organs.size(); ++o) {
+    const RestShape& rest = impl_->world.organs[o].rest;
+    const std::vector<Vector3>& velocities = impl_->state.organs[o].velocities;
+    for (std::size_t v = 0; v < velocities.size(); ++v) energy += 0.5 * rest.mass[v] * velocities[v].squaredNorm();
+  }
+  return energy;
+}
+
+double Timeline::elastic_energy() const {
+  double energy = 0.0;
+  for (std::size_t o = 0; o < impl_->state.organs.size(); ++o) {
+    std::vector<Vector3> forces(impl_->state.organs[o].positions.size());
+    std::vector<Vector3> gradient(forces.size());
+    energy += element_forces(impl_->world.organs[o].rest, impl_->state.organs[o], forces, gradient);
+  }
+  return energy;
+}
+
+int Timeline::active_vertices() const {
+  int active = 0;
+  for (const OrganState& organ : impl_->state.organs) {
+    if (!organ.asleep) active += static_cast<int>(organ.positions.size());
+  }
+  return active;
+}
+
+}  // namespace tissue_sim
