@@ -1,31 +1,49 @@
-#include <ros/console.h>
-#include <ros/master.h>
+#include <ros/network.h>
+#include <xmlrpcpp/XmlRpc.h>
 
+#include <cstdlib>
 #include <iostream>
+#include <stdexcept>
 
 #include "tissue_sim/ros/node.h"
 
 namespace {
 
-/// roscpp prints a line of its own where there is no master; the one with the cure is enough.
-bool master_answers() {
-  const bool quiet = ros::console::set_logger_level("ros", ros::console::levels::Fatal);
-  if (quiet) ros::console::notifyLoggerLevelsChanged();
-  const bool answers = ros::master::check();
-  if (quiet && ros::console::set_logger_level("ros", ros::console::levels::Info)) {
-    ros::console::notifyLoggerLevelsChanged();
+struct Silence : XmlRpc::XmlRpcErrorHandler {
+  void error(const char* /*message*/) override {}
+};
+
+/// Before ros::init, which waits for ever for a master to take the parameters of the command line.
+void require_master(int argc, char** argv) {
+  const char* environment = std::getenv("ROS_MASTER_URI");
+  std::string uri = environment == nullptr ? "" : environment;
+  const std::string remap = "__master:=";
+  for (int i = 1; i < argc; ++i) {
+    if (std::string(argv[i]).rfind(remap, 0) == 0) uri = std::string(argv[i]).substr(remap.size());
   }
-  return answers;
+  std::string host;
+  std::uint32_t port = 0;
+  if (!ros::network::splitURI(uri, host, port)) {
+    throw std::runtime_error("ROS_MASTER_URI is \"" + uri + "\"; set it, for example to http://localhost:11311");
+  }
+  Silence silence;
+  XmlRpc::XmlRpcErrorHandler* const loud = XmlRpc::XmlRpcErrorHandler::getErrorHandler();
+  XmlRpc::XmlRpcErrorHandler::setErrorHandler(&silence);
+  XmlRpc::XmlRpcClient client(host.c_str(), static_cast<int>(port), "/");
+  XmlRpc::XmlRpcValue request, response;
+  request[0] = "tissue_sim_node";
+  const bool answers = client.execute("getPid", request, response);
+  client.close();
+  XmlRpc::XmlRpcErrorHandler::setErrorHandler(loud);
+  if (!answers) throw std::runtime_error("no ROS master at " + uri + "; start roscore or set ROS_MASTER_URI");
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   try {
+    require_master(argc, argv);
     ros::init(argc, argv, "tissue_sim");
-    if (!master_answers()) {
-      throw std::runtime_error("no ROS master at " + ros::master::getURI() + "; start roscore or set ROS_MASTER_URI");
-    }
     tissue_sim::Node node(tissue_sim::read_parameters());
     node.spin();
   } catch (const std::exception& error) {

@@ -18,8 +18,10 @@ constexpr int missing_transform = pose_verdicts;  // a cause beside the timeline
 // advance: realtime stays this far behind the clock (ns), so that a pose that is late by less is still taken.
 constexpr std::int64_t hold_off = 100'000'000;
 
-// Live, the newest pose wins, and the ones before it are counted by the timeline: enough to see a burst whole.
+// Live, the newest pose wins, and the ones before it are counted by the timeline: enough to see a burst whole. In a
+// replay nothing may be lost, neither on the way in nor on the way out.
 constexpr unsigned live_queue = 100;
+constexpr unsigned live_state_queue = 10;
 constexpr unsigned no_limit = 0;
 
 Scene load(const std::string& path) {
@@ -66,7 +68,9 @@ Node::Node(const NodeParameters& parameters)
 }
 
 void Node::advertise() {
-  contacts_ = private_.advertise<Contacts>("contacts", 100);
+  const unsigned queue = parameters_.keep_all_poses ? no_limit : live_queue;
+  const unsigned state_queue = parameters_.keep_all_poses ? no_limit : live_state_queue;
+  contacts_ = private_.advertise<Contacts>("contacts", queue);
   diagnostics_ = node_.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10);
   // Who looks on before the first pose sees the organs at rest.
   markers_ = serving_.advertise<visualization_msgs::MarkerArray>(
@@ -78,7 +82,7 @@ void Node::advertise() {
     Output& output = outputs_[i];
     const std::string& name = scene_.organs[i].name;
     output.topology = topology_message(scene_, static_cast<int>(i));
-    output.state_publisher = private_.advertise<TissueState>(name + "/state", 10);
+    output.state_publisher = private_.advertise<TissueState>(name + "/state", state_queue);
     output.topology_publisher = private_.advertise<TissueTopology>(name + "/topology", 1, true);
     output.topology_publisher.publish(output.topology);
   }
@@ -88,15 +92,14 @@ void Node::advertise() {
   inputs_.resize(scene_.instruments.size());
   for (std::size_t i = 0; i < inputs_.size(); ++i) {
     const Instrument& instrument = scene_.instruments[i];
-    inputs_[i].wrench = private_.advertise<geometry_msgs::WrenchStamped>(instrument.name + "/measured_cf", 100);
+    inputs_[i].wrench = private_.advertise<geometry_msgs::WrenchStamped>(instrument.name + "/measured_cf", queue);
     const boost::function<void(const geometry_msgs::PoseStamped&)> take = [this, i](const auto& message) {
       inputs_[i].waiting.push_back({message, ros::WallTime::now()});
       last_pose_ = ros::WallTime::now();
       pose_since_diagnostics_ = true;
     };
     inputs_[i].subscriber = node_.subscribe<geometry_msgs::PoseStamped>(
-        instrument.pose_topic, parameters_.keep_all_poses ? no_limit : live_queue, take, ros::VoidConstPtr(),
-        ros::TransportHints().tcpNoDelay());
+        instrument.pose_topic, queue, take, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay());
     ROS_INFO_STREAM("instrument \"" << instrument.name << "\" follows " << inputs_[i].subscriber.getTopic());
   }
 }
