@@ -159,7 +159,8 @@ urdf::ModelInterfaceSharedPtr parse(const std::string& path) {
   } catch (const std::exception& error) {
     messages.text += (messages.text.empty() ? "" : "; ") + std::string(error.what());
   }
-  if (!model || !model->getRoot()) {
+  // urdfdom goes on without what it cannot read: the tip could be missing.
+  if (!model || !model->getRoot() || !messages.text.empty()) {
     throw SceneError(path + ": is not a URDF: " + (messages.text.empty() ? "it has no <robot>" : messages.text));
   }
   return model;

@@ -44,20 +44,21 @@ void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent,
 }
 
 std::string count(int n, const std::string& one) {
-  const std::string many = one == "vertex" ? "vertices" : one + "s";
+  const bool vertex = one.size() >= 6 && one.compare(one.size() - 6, 6, "vertex") == 0;
+  const std::string many = vertex ? one.substr(0, one.size() - 2) + "ices" : one + "s";
   return std::to_string(n) + " " + (n == 1 ? one : many);
 }
 
 /// The faults that stand between a mesh and a closed manifold surface: "3 boundary edges, 1 non-manifold edge".
 std::string list_faults(const MeshFaults& faults) {
-  const std::pair<int, const char*> all[] = {{faults.non_finite_vertices, "non-finite vertices"},
-                                             {faults.boundary_edges, "boundary edges"},
-                                             {faults.non_manifold_edges, "non-manifold edges"},
-                                             {faults.misoriented_edges, "misoriented edges"},
-                                             {faults.non_manifold_vertices, "non-manifold vertices"}};
+  const std::pair<int, const char*> all[] = {{faults.non_finite_vertices, "non-finite vertex"},
+                                             {faults.boundary_edges, "boundary edge"},
+                                             {faults.non_manifold_edges, "non-manifold edge"},
+                                             {faults.misoriented_edges, "misoriented edge"},
+                                             {faults.non_manifold_vertices, "non-manifold vertex"}};
   std::string list;
   for (const auto& [number, name] : all) {
-    if (number > 0) list += (list.empty() ? "" : ", ") + std::to_string(number) + " " + name;
+    if (number > 0) list += (list.empty() ? "" : ", ") + count(number, name);
   }
   return list;
 }

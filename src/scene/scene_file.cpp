@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <functional>
 #include <iomanip>
 #include <limits>
@@ -166,8 +167,8 @@ auto load_from(const YamlMapping& yaml, const std::string& key, std::vector<std:
   }
 }
 
-Organ read_organ(const YamlMapping& yaml, const Frames& frames, const std::string& root,
-                 std::vector<std::string>& warnings) {
+/// All of an organ, its mesh still in its own frame and nothing attached.
+Organ read_organ(const YamlMapping& yaml, std::vector<std::string>& warnings) {
   Organ organ;
   organ.name = yaml.name("name");
   organ.model = read_model(yaml);
@@ -182,16 +183,22 @@ Organ read_organ(const YamlMapping& yaml, const Frames& frames, const std::strin
     yaml.fail("wall_thickness", "is used by the model surface only, delete it");
   }
   if (organ.model == Model::surface || yaml.has("material")) organ.material = read_material(yaml);
-  const Pose pose = read_organ_pose(yaml, frames, root);
   const double scale =
       yaml.number("scale", above_zero, "a number above 0: file units to metres, 0.001 for millimetres");
   organ.mesh = load_from(yaml, "mesh", warnings, [&](const std::string& path, std::vector<std::string>& said) {
     return load_organ_mesh(path, scale, said);
   });
-  organ.attached = read_attachments(yaml, organ.mesh.vertices);
-  for (Vector3& p : organ.mesh.vertices) p = pose.apply(p);
-  if (!inspect(organ.mesh).closed_manifold()) yaml.fail("pose", "moves the organ so far that its shape is lost");
   return organ;
+}
+
+/// Attaches an organ and carries it into the scene's frame.
+void place_organ(const YamlMapping& yaml, const Pose& pose, Organ& organ) {
+  organ.attached = read_attachments(yaml, organ.mesh.vertices);
+  const double volume = enclosed_volume(organ.mesh);
+  for (Vector3& p : organ.mesh.vertices) p = pose.apply(p);
+  if (!(std::abs(enclosed_volume(organ.mesh) - volume) <= 1e-6 * volume)) {
+    yaml.fail("pose", "moves the organ so far that rounding changes its shape, is xyz in metres?");
+  }
 }
 
 Instrument read_instrument(const YamlMapping& yaml, std::vector<std::string>& warnings) {
@@ -273,9 +280,12 @@ Scene load_scene(const std::string& path, std::vector<std::string>& warnings) {
       if (!names.insert(name).second) object.fail("name", "is '" + name + "' like another object, give each its own");
     }
   }
-  for (const YamlMapping& organ : organs) scene.organs.push_back(read_organ(organ, frames, scene.frame, warnings));
+  for (const YamlMapping& organ : organs) scene.organs.push_back(read_organ(organ, warnings));
   for (const YamlMapping& instrument : instruments) scene.instruments.push_back(read_instrument(instrument, warnings));
   check_sizes(scene, organs);
+  for (std::size_t o = 0; o < organs.size(); ++o) {
+    place_organ(organs[o], read_organ_pose(organs[o], frames, scene.frame), scene.organs[o]);
+  }
   return scene;
 }
 

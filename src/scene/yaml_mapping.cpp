@@ -111,7 +111,8 @@ void YamlMapping::read(const YAML::Node& node, Keys known) {
       const std::size_t distance = edit_distance(key, *nearest);
       const bool near = distance <= 2 && distance < key.size();
       throw SceneError(at(file_, mark) + path_of(key) + ": is not known here" +
-                       (near ? ", did you mean " + std::string(*nearest) + "?" : "") + ", allowed are " + join(known));
+                       (near ? ", did you mean " + std::string(*nearest) + "? Allowed are " : ", allowed are ") +
+                       join(known));
     }
     entries_.push_back({key, mark, pair.second});
   }
@@ -128,7 +129,10 @@ std::string YamlMapping::place(const std::string& key) const {
 }
 
 void YamlMapping::fail(const std::string& key, const std::string& problem) const {
-  throw SceneError(place(key) + problem);
+  std::string line = problem;  // a value or a message from elsewhere may hold line breaks
+  std::replace_if(
+      line.begin(), line.end(), [](unsigned char c) { return c < 32 || c == 127; }, ' ');
+  throw SceneError(place(key) + line);
 }
 
 const YAML::Node& YamlMapping::value(const std::string& key) const {

@@ -48,7 +48,7 @@ class YamlMapping {
       if (word == known) return value;
       allowed += (allowed.empty() ? "" : ", ") + std::string(known);
     }
-    fail(key, "is " + word + ", allowed are " + allowed);
+    fail(key, "is '" + word + "', allowed are " + allowed);
   }
   template <typename Value>
   Value choice(const std::string& key, std::initializer_list<std::pair<const char*, Value>> words,
