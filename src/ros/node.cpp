@@ -256,7 +256,10 @@ void Node::publish_diagnostics() {
   std::uint64_t drops = missing_transforms_;
   for (const PoseVerdict verdict :
        {PoseVerdict::zero_stamp, PoseVerdict::non_finite, PoseVerdict::zero_quaternion, PoseVerdict::stale}) {
-    add_value(status, std::string("dropped_") + to_string(verdict), count(verdict));
+    std::string cause = to_string(verdict);
+    std::replace_if(
+        cause.begin(), cause.end(), [](char c) { return c == ' ' || c == '-'; }, '_');
+    add_value(status, "dropped_" + cause, count(verdict));
     drops += count(verdict);
   }
   add_value(status, "dropped_missing_transform", missing_transforms_);

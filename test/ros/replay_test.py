@@ -73,7 +73,7 @@ class ReplayTest(unittest.TestCase):
         self.assertEqual(first['poses_dropped'], 1)
         self.assertEqual(first['non_finite'], 0)
         self.assertGreater(first['contact_steps'], 100)
-        self.assertEqual(len(first['rows']), 148)
+        self.assertEqual(len(first['rows']), 149)
         for rate in (1, 5):
             state_hash, steps = self.played('%s_%d' % (name, rate), bag, rate)
             self.assertEqual(steps, str(first['steps']))

@@ -1,0 +1,115 @@
+#include "tissue_sim/ros/messages.h"
+
+#include <gtest/gtest.h>
+
+#include "tissue_sim/geometry/primitives.h"
+
+namespace tissue_sim {
+namespace {
+
+constexpr double half_root = 0.70710678118654752;
+
+Scene ball_scene() {
+  Organ ball;
+  ball.name = "ball";
+  ball.mesh = make_sphere(0.03, 8);
+  ball.model = Model::contact_only;
+  Instrument probe;
+  probe.name = "probe";
+  probe.tip_link = "tip";
+  probe.pose_topic = "test/measured_cp";
+  probe.parts.push_back({"tip", make_sphere(0.005, 6), true});
+  Scene scene;
+  scene.frame = "world";
+  scene.organs.push_back(ball);
+  scene.instruments.push_back(probe);
+  return scene;
+}
+
+TEST(Messages, HashIsSixteenDigits) {
+  EXPECT_EQ(hash_text(0), "0000000000000000");
+  EXPECT_EQ(hash_text(0xfedcba9876543210U), "fedcba9876543210");
+}
+
+TEST(Messages, TimeKeepsEveryNanosecond) {
+  const ros::Time time = to_ros_time(1'600'000'000'123'456'789);
+  EXPECT_EQ(time.sec, 1'600'000'000U);
+  EXPECT_EQ(time.nsec, 123'456'789U);
+  EXPECT_TRUE(to_ros_time(-1).isZero());
+}
+
+TEST(Messages, PoseIsTakenAsItIs) {
+  geometry_msgs::Pose message;
+  message.position.y = 2.0;
+  EXPECT_EQ(to_pose(message).orientation.norm(), 0.0);  // the timeline has to see that it is faulty
+  EXPECT_EQ(to_pose(message).position, Vector3(0.0, 2.0, 0.0));
+}
+
+TEST(Messages, TopologyHoldsTheRestShape) {
+  Scene scene = ball_scene();
+  const TissueTopology topology = topology_message(scene, 0);
+  const TriangleMesh& mesh = scene.organs[0].mesh;
+  ASSERT_EQ(topology.triangles.size(), 3 * mesh.triangles.size());
+  ASSERT_EQ(topology.rest_positions.size(), 3 * mesh.vertices.size());
+  EXPECT_EQ(topology.triangles[4], static_cast<std::uint32_t>(mesh.triangles[1][1]));
+  EXPECT_EQ(topology.rest_positions[5], static_cast<float>(mesh.vertices[1].z()));
+  EXPECT_EQ(topology.organ, "ball");
+  EXPECT_EQ(topology.header.frame_id, "world");
+
+  scene.organs[0].mesh.vertices[3].x() += 0.001;
+  EXPECT_NE(topology_message(scene, 0).topology_id, topology.topology_id);
+}
+
+TEST(Messages, ContactsAreNamed) {
+  const Scene scene = ball_scene();
+  StepReport report;
+  report.step = 7;
+  report.stamp = 2'000'000'001;
+  Contact contact;
+  contact.triangle = 5;
+  contact.barycentric = {0.25, 0.5, 0.25};
+  contact.point = {0.0, 0.0, 0.03};
+  contact.direction = -Vector3::UnitZ();
+  contact.depth = 0.002;
+  contact.force = {0.0, 0.0, -0.5};
+  report.contacts.push_back(contact);
+  const Contacts message = contacts_message(scene, report);
+  EXPECT_EQ(message.step, 7U);
+  EXPECT_EQ(message.header.stamp, ros::Time(2, 1));
+  ASSERT_EQ(message.contacts.size(), 1U);
+  EXPECT_EQ(message.contacts[0].organ, "ball");
+  EXPECT_EQ(message.contacts[0].instrument, "probe");
+  EXPECT_EQ(message.contacts[0].link, "tip");
+  EXPECT_EQ(message.contacts[0].triangle, 5U);
+  EXPECT_EQ(message.contacts[0].barycentric[1], 0.5F);
+  EXPECT_EQ(message.contacts[0].direction.z, -1.0);
+  EXPECT_EQ(message.contacts[0].force.z, -0.5);
+}
+
+TEST(Messages, WrenchTurnsIntoThePosesFrame) {
+  Wrench wrench;
+  wrench.force = Vector3::UnitX();
+  wrench.torque = Vector3::UnitZ();
+  // A quarter turn about y: the frame's z axis is the scene's x axis.
+  const Eigen::Quaterniond frame_to_scene(half_root, 0.0, half_root, 0.0);
+  const geometry_msgs::WrenchStamped message = wrench_message(wrench, 3, "arm", frame_to_scene);
+  EXPECT_EQ(message.header.frame_id, "arm");
+  EXPECT_NEAR(message.wrench.force.z, 1.0, 1e-15);
+  EXPECT_NEAR(message.wrench.force.x, 0.0, 1e-15);
+  EXPECT_NEAR(message.wrench.torque.x, -1.0, 1e-15);
+}
+
+TEST(Messages, MarkersBeforeTheFirstStep) {
+  const Scene scene = ball_scene();
+  const Timeline timeline(scene);
+  const visualization_msgs::MarkerArray array = markers_message(scene, timeline);
+  ASSERT_GE(array.markers.size(), 2U);
+  EXPECT_EQ(array.markers[0].points.size(), 3 * scene.organs[0].mesh.triangles.size());
+  EXPECT_EQ(array.markers[0].colors.size(), array.markers[0].points.size());
+  // rviz calls a list without points an error.
+  EXPECT_EQ(array.markers[1].ns, "contacts");
+  EXPECT_EQ(array.markers[1].action, visualization_msgs::Marker::DELETE);
+}
+
+}  // namespace
+}  // namespace tissue_sim
