@@ -8,8 +8,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <fstream>
 #include <map>
-#include <set>
 
 #include "tissue_sim/ros/frames.h"
 #include "tissue_sim/ros/messages.h"
@@ -24,12 +24,11 @@ std::string without_slash(const std::string& topic) {
 }
 
 void open_to_read(rosbag::Bag& bag, const std::string& path) {
+  if (!std::ifstream(path)) throw std::runtime_error(path + ": cannot be read; give the path of a bag file");
   try {
     bag.open(path, rosbag::bagmode::Read);
   } catch (const rosbag::BagUnindexedException&) {
     throw std::runtime_error(path + ": the bag has no index (its recording was cut off); run: rosbag reindex " + path);
-  } catch (const rosbag::BagIOException&) {
-    throw std::runtime_error(path + ": cannot be read; give the path of a bag file");
   } catch (const rosbag::BagException& error) {
     throw std::runtime_error(path + ": not a bag that can be read (" + error.what() + ")");
   }

@@ -8,10 +8,10 @@
 namespace tissue_sim {
 namespace {
 
-constexpr double full_red_depth = 0.010;          // m; deeper is as red
-constexpr double contact_radius = 0.0008;         // m; small beside a dent, visible beside an organ
-constexpr double arrow_length_per_newton = 0.05;  // m/N; soft tissue answers an instrument with about a newton
-constexpr double longest_arrow = 0.15;            // m; a larger force is drawn no longer
+constexpr double full_red_depth = 0.010;         // m; deeper is as red
+constexpr double contact_radius = 0.0008;        // m; small beside a dent, visible beside an organ
+constexpr double arrow_length_per_newton = 0.4;  // m/N; soft tissue answers a probe with about 0.1 N
+constexpr double longest_arrow = 0.15;           // m; a larger force is drawn no longer
 
 geometry_msgs::Point to_point(const Vector3& v) {
   geometry_msgs::Point point;

@@ -98,7 +98,7 @@ TEST_F(ReplayTest, WritesWhatTheNodePublishes) {
   EXPECT_EQ(count("ball/topology"), 1U);
   EXPECT_EQ(count("contacts"), 50U);
   EXPECT_EQ(count("probe/measured_cf"), 50U);
-  EXPECT_NEAR(count("ball/state"), 0.49 / 0.016, 2.0);
+  EXPECT_EQ(count("ball/state"), 25U);  // on the stamps of poses, 10 ms apart, that are 16 ms or more apart
   EXPECT_FALSE(exists(options.output + ".unfinished"));
 }
 
@@ -123,7 +123,7 @@ TEST_F(ReplayTest, NotABag) {
   std::ofstream(options.input) << "frame: world\n";
   EXPECT_NE(refusal().find("in.bag: not a bag"), std::string::npos) << refusal();
   std::ofstream(options.input, std::ios::trunc).close();
-  EXPECT_NE(refusal(), "");
+  EXPECT_NE(refusal().find("in.bag: not a bag"), std::string::npos) << refusal();
   EXPECT_FALSE(exists(options.output));
 }
 
