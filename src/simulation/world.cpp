@@ -12,7 +12,7 @@ namespace {
 
 /// An instrument moves at most this part of an organ edge between two contact passes: with 1 mm jumps on 5 mm edges the response was
 /// seen to blow up once in six.
-constexpr double edge_fraction = 0.1;
+constexpr double edge_fraction = 0.25;
 
 /// ... and this part of its own thickness, so that nothing is passed over and the nearest way out is the way it came.
 constexpr double thickness_fraction = 0.25;
