@@ -9,7 +9,7 @@ namespace tissue_sim {
 namespace {
 
 constexpr double full_red_depth = 0.010;         // m; deeper is as red
-constexpr double contact_radius = 0.0008;        // m; small beside a dent, visible beside an organ
+constexpr double contact_radius = 0.0030;        // m; small beside a dent, visible beside an organ
 constexpr double arrow_length_per_newton = 0.4;  // m/N; soft tissue answers a probe with about 0.1 N
 constexpr double longest_arrow = 0.15;           // m; a larger force is drawn no longer
 
@@ -43,9 +43,9 @@ std_msgs::ColorRGBA colour(float r, float g, float b, float a = 1.0F) {
 }
 
 /// From the blue-grey of untouched tissue to red.
-std_msgs::ColorRGBA depth_colour(double depth) {
+std_msgs::ColorRGBA depth_colour(double depth, float bright) {
   const auto t = static_cast<float>(std::min(1.0, std::max(0.0, depth / full_red_depth)));
-  return colour(0.55F + 0.35F * t, 0.62F - 0.54F * t, 0.70F - 0.62F * t);
+  return colour(bright * (0.62F + 0.33F * t), bright * (0.69F - 0.61F * t), bright * (0.78F - 0.70F * t));
 }
 
 std::uint32_t fnv1a(std::uint32_t hash, const void* data, std::size_t size) {
@@ -67,14 +67,35 @@ visualization_msgs::Marker marker(const std_msgs::Header& header, const std::str
   return m;
 }
 
+/// How bright each vertex is. rviz does not light triangles with colours of their own, and without shading a dent
+/// cannot be seen: so the light is put into the colours.
+std::vector<float> brightness(const TriangleMesh& mesh, const std::vector<Vector3>& positions) {
+  const auto at = [&](int vertex) -> const Vector3& { return positions[static_cast<std::size_t>(vertex)]; };
+  std::vector<Vector3> normals(positions.size(), Vector3::Zero());
+  for (const Triangle& triangle : mesh.triangles) {
+    const Vector3 normal = area_normal(at(triangle[0]), at(triangle[1]), at(triangle[2]));
+    for (const int vertex : triangle) normals[static_cast<std::size_t>(vertex)] += normal;
+  }
+  const Vector3 light = Vector3(0.75, -0.35, 0.55).normalized();
+  std::vector<float> bright(positions.size());
+  for (std::size_t i = 0; i < bright.size(); ++i) {
+    const double length = normals[i].norm();
+    const double cosine = length > 0.0 ? normals[i].dot(light) / length : 1.0;
+    bright[i] = static_cast<float>(0.62 + 0.38 * cosine);
+  }
+  return bright;
+}
+
 visualization_msgs::Marker organ_marker(const std_msgs::Header& header, const Organ& organ, const OrganView& view) {
   auto m = marker(header, "organ/" + organ.name, 0, visualization_msgs::Marker::TRIANGLE_LIST);
+  const std::vector<float> bright = brightness(organ.mesh, view.positions);
   m.points.reserve(3 * organ.mesh.triangles.size());
   m.colors.reserve(3 * organ.mesh.triangles.size());
   for (const Triangle& triangle : organ.mesh.triangles) {
-    for (const int vertex : triangle) {
-      m.points.push_back(to_point(view.positions[static_cast<std::size_t>(vertex)]));
-      m.colors.push_back(depth_colour(view.depths[static_cast<std::size_t>(vertex)]));
+    for (const int corner : triangle) {
+      const auto vertex = static_cast<std::size_t>(corner);
+      m.points.push_back(to_point(view.positions[vertex]));
+      m.colors.push_back(depth_colour(view.depths[vertex], bright[vertex]));
     }
   }
   return m;
@@ -101,8 +122,8 @@ visualization_msgs::Marker force_marker(const std_msgs::Header& header, const In
   const double length = std::min(longest_arrow, newtons * arrow_length_per_newton);
   m.points = {to_point(tip.position), to_point(tip.position + force * (length / newtons))};
   m.scale.x = 0.002;  // shaft diameter, head diameter, head length, m
-  m.scale.y = 0.005;
-  m.scale.z = std::min(0.008, 0.4 * length);
+  m.scale.y = 0.007;
+  m.scale.z = std::min(0.012, 0.4 * length);
   m.color = colour(0.1F, 0.8F, 0.2F);
   return m;
 }
@@ -110,7 +131,7 @@ visualization_msgs::Marker force_marker(const std_msgs::Header& header, const In
 visualization_msgs::Marker part_marker(const std_msgs::Header& header, const Instrument& instrument, int part,
                                        const Pose& tip) {
   auto m = marker(header, "instrument/" + instrument.name, part, visualization_msgs::Marker::TRIANGLE_LIST);
-  m.color = colour(0.85F, 0.87F, 0.92F, 0.45F);
+  m.color = colour(0.85F, 0.87F, 0.92F, 0.35F);
   m.pose.position = to_point(tip.position);
   m.pose.orientation.x = tip.orientation.x();
   m.pose.orientation.y = tip.orientation.y();
