@@ -8,6 +8,7 @@
 #include <array>
 #include <assimp/Importer.hpp>
 #include <cctype>
+#include <fstream>
 #include <set>
 
 #include "tissue_sim/scene/scene.h"
@@ -20,6 +21,16 @@ constexpr double flat_ratio = 1e-9;
 
 [[noreturn]] void fail(const std::string& path, const std::string& problem) {
   throw SceneError(path + ": " + problem);
+}
+
+/// assimp 5.2 never comes back from a PLY file that ends within its header.
+bool has_whole_ply_header(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string line;
+  for (int lines = 0; lines < 1000 && std::getline(file, line); ++lines) {
+    if (line.compare(0, 10, "end_header") == 0 && !file.eof()) return true;
+  }
+  return false;
 }
 
 void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent, const Vector3& scale,
@@ -47,6 +58,24 @@ std::string count(int n, const std::string& one) {
   const bool vertex = one.size() >= 6 && one.compare(one.size() - 6, 6, "vertex") == 0;
   const std::string many = vertex ? one.substr(0, one.size() - 2) + "ices" : one + "s";
   return std::to_string(n) + " " + (n == 1 ? one : many);
+}
+
+/// Faces of more than three corners. Refuses faces that assimp has left unset, as it does for a PLY file that ends
+/// among its vertices: cutting those into triangles ends the program in an assertion.
+int count_polygons(const std::string& path, const aiScene& scene) {
+  int polygons = 0;
+  for (unsigned m = 0; m < scene.mNumMeshes; ++m) {
+    const aiMesh& mesh = *scene.mMeshes[m];
+    for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
+      const aiFace& face = mesh.mFaces[f];
+      const bool complete = face.mIndices && face.mNumIndices > 0 &&
+                            std::all_of(face.mIndices, face.mIndices + face.mNumIndices,
+                                        [&](unsigned v) { return v < mesh.mNumVertices; });
+      if (!complete) fail(path, "a face names a vertex that is not there, is the file cut short? Export it again");
+      polygons += face.mNumIndices > 3;
+    }
+  }
+  return polygons;
 }
 
 /// The faults that stand between a mesh and a closed manifold surface: "3 boundary edges, 1 non-manifold edge".
@@ -148,22 +177,23 @@ TriangleMesh read_mesh(const std::string& path, const Vector3& scale) {
   if (std::find(known.begin(), known.end(), ending) == known.end()) {
     fail(path, "is not a mesh that can be read, allowed are .stl, .obj, .ply and .dae");
   }
+  if (ending == ".ply" && !has_whole_ply_header(path))
+    fail(path, "its PLY header is not ended by end_header, export it again");
   Assimp::Importer importer;
   importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
-  const aiScene* scene = importer.ReadFile(path, aiProcess_Triangulate);
+  const aiScene* scene = importer.ReadFile(path, 0);
   if (!scene || !scene->mRootNode) {
     std::string why = importer.GetErrorString();
     std::replace_if(
         why.begin(), why.end(), [](unsigned char c) { return c < 32 || c > 126; }, ' ');
     fail(path, "cannot be read as a mesh (" + why + "), export it again");
   }
+  const int polygons = count_polygons(path, *scene);
+  if (polygons > 0) scene = importer.ApplyPostProcessing(aiProcess_Triangulate);
+  if (!scene) fail(path, "its " + count(polygons, "polygon") + " cannot be cut into triangles, export triangles");
   TriangleMesh mesh;
   append(*scene, *scene->mRootNode, aiMatrix4x4(), scale, mesh);
   if (mesh.triangles.empty()) fail(path, "holds no triangles, export the surface, not only its points or lines");
-  const MeshFaults faults = inspect(mesh);
-  if (faults.bad_indices > 0) {
-    fail(path, count(faults.bad_indices, "triangle") + " name a vertex that is not there, export it again");
-  }
   return mesh;
 }
 

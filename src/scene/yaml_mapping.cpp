@@ -14,8 +14,8 @@ std::string at(const std::string& file, const YAML::Mark& mark) {
   return file + ":" + std::to_string(mark.line + 1) + ":" + std::to_string(mark.column + 1) + ": ";
 }
 
+/// Values and messages from elsewhere may hold line breaks; an error is one line.
 std::string one_line(std::string text) {
-  text.resize(std::min<std::size_t>(text.size(), 60));
   std::replace_if(
       text.begin(), text.end(), [](unsigned char c) { return c < 32 || c == 127; }, ' ');
   return text;
@@ -25,7 +25,7 @@ std::string one_line(std::string text) {
 std::string shown(const YAML::Node& node) {
   if (node.IsMap()) return "a mapping";
   if (node.IsSequence()) return "a list of " + std::to_string(node.size());
-  return node.IsScalar() ? "'" + one_line(node.Scalar()) + "'" : "nothing";
+  return node.IsScalar() ? "'" + one_line(node.Scalar().substr(0, 60)) + "'" : "nothing";
 }
 
 bool is_plain(const YAML::Node& node) {
@@ -76,7 +76,8 @@ YAML::Node load(const std::string& file) {
     throw SceneError(at(file, YAML::Mark()) + "scene: holds " + std::to_string(documents.size()) +
                      " YAML documents, a scene is one");
   } catch (const YAML::Exception& error) {
-    throw SceneError(at(file, error.mark.is_null() ? YAML::Mark() : error.mark) + "scene: is not YAML: " + error.msg);
+    throw SceneError(at(file, error.mark.is_null() ? YAML::Mark() : error.mark) +
+                     "scene: is not YAML: " + one_line(error.msg));
   }
 }
 
@@ -99,7 +100,7 @@ void YamlMapping::read(const YAML::Node& node, Keys known) {
   }
   for (const auto& pair : node) {
     const YAML::Mark mark = pair.first.Mark();
-    const std::string key = pair.first.IsScalar() ? one_line(pair.first.Scalar()) : shown(pair.first);
+    const std::string key = pair.first.IsScalar() ? one_line(pair.first.Scalar().substr(0, 60)) : shown(pair.first);
     if (const Entry* first = find(key)) {
       throw SceneError(at(file_, mark) + path_of(key) + ": stands here and in line " +
                        std::to_string(first->mark.line + 1) + ", delete one");
@@ -129,10 +130,7 @@ std::string YamlMapping::place(const std::string& key) const {
 }
 
 void YamlMapping::fail(const std::string& key, const std::string& problem) const {
-  std::string line = problem;  // a value or a message from elsewhere may hold line breaks
-  std::replace_if(
-      line.begin(), line.end(), [](unsigned char c) { return c < 32 || c == 127; }, ' ');
-  throw SceneError(place(key) + line);
+  throw SceneError(place(key) + one_line(problem));
 }
 
 const YAML::Node& YamlMapping::value(const std::string& key) const {
