@@ -8,9 +8,9 @@
 #include <array>
 #include <assimp/Importer.hpp>
 #include <cctype>
-#include <fstream>
 #include <set>
 
+#include "ply_check.h"
 #include "tissue_sim/scene/scene.h"
 
 namespace tissue_sim {
@@ -21,16 +21,6 @@ constexpr double flat_ratio = 1e-9;
 
 [[noreturn]] void fail(const std::string& path, const std::string& problem) {
   throw SceneError(path + ": " + problem);
-}
-
-/// assimp 5.2 never comes back from a PLY file that ends within its header.
-bool has_whole_ply_header(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::string line;
-  for (int lines = 0; lines < 1000 && std::getline(file, line); ++lines) {
-    if (line.compare(0, 10, "end_header") == 0 && !file.eof()) return true;
-  }
-  return false;
 }
 
 void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent, const Vector3& scale,
@@ -177,8 +167,8 @@ TriangleMesh read_mesh(const std::string& path, const Vector3& scale) {
   if (std::find(known.begin(), known.end(), ending) == known.end()) {
     fail(path, "is not a mesh that can be read, allowed are .stl, .obj, .ply and .dae");
   }
-  if (ending == ".ply" && !has_whole_ply_header(path))
-    fail(path, "its PLY header is not ended by end_header, export it again");
+  const std::string missing = ending == ".ply" ? missing_in_ply(path) : "";
+  if (!missing.empty()) fail(path, "has not " + missing + ", export it again");
   Assimp::Importer importer;
   importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
   const aiScene* scene = importer.ReadFile(path, 0);
