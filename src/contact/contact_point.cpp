@@ -8,6 +8,21 @@ namespace tissue_sim {
 
 namespace {
 
+/// Of the triangle's longest side: how far a poke pushes a triangle in one pass. After an instrument has appeared inside an organ the
+/// nearest surface is far, and pulled over at once it folds.
+constexpr double longest_push = 0.5;
+
+/// Of the same: the motion after which a vertex that faces away from the nearest surface is looked at again.
+constexpr double recheck = 0.05;
+
+double longest_side(const OrganSurface& organ, int triangle) {
+  const auto& [a, b, c] = organ.triangles[triangle];
+  const Vector3& p = organ.positions[a];
+  const Vector3& q = organ.positions[b];
+  const Vector3& r = organ.positions[c];
+  return std::sqrt(std::max({(q - p).squaredNorm(), (r - q).squaredNorm(), (p - r).squaredNorm()}));
+}
+
 /// A point of the organ pushed along `direction` (scene frame) until it reaches `place` (scene frame).
 ContactPoint contact_at(const OrganSurface& organ, int piece, int triangle, const Vector3& weights, const Vector3& place,
                         const Vector3& direction) {
@@ -84,9 +99,11 @@ void add_poke_contacts(const OrganSurface& organ, const InstrumentSurface& instr
 
     const Vector3 tip = pose.apply(instrument.vertices[u]);
     const ClosestOnMesh closest =
-        closest_on_mesh(organ.positions, organ.triangles, organ.tree, tip, std::numeric_limits<double>::max());
+        closest_on_mesh(organ.positions, organ.triangles, organ.tree, tip, std::numeric_limits<double>::max(),
+                        clearance.nearest[u]);
     if (closest.triangle < 0) continue;  // a position that is not a number is near nothing
     const double distance = std::sqrt(closest.squared_distance);
+    clearance.nearest[u] = closest.triangle;
     clearance.free_until[u] = travelled + distance - contact_margin;
     const Vector3 outward =
         pseudonormal(organ.positions, organ.triangles, organ.topology, closest.triangle, closest.on.feature);
@@ -94,12 +111,18 @@ void add_poke_contacts(const OrganSurface& organ, const InstrumentSurface& instr
     const bool below_surface = !(above.dot(outward) > 0.0);
     if (!below_surface && !(distance < contact_margin)) continue;
 
-    clearance.free_until[u] = travelled;
     const Vector3 direction = distance < 1e-9   ? Vector3(-outward.stableNormalized())
                               : below_surface ? Vector3(above / distance)
                                               : Vector3(-above / distance);
-    points.push_back(contact_at(organ, piece, closest.triangle, closest.on.barycentric, tip + contact_margin * direction,
-                                direction));
+    const double side = longest_side(organ, closest.triangle);
+    if (!(direction.dot(pose.orientation * instrument.vertex_normals[u]) > 0.0)) {
+      clearance.free_until[u] = travelled + recheck * side;
+      continue;
+    }
+    clearance.free_until[u] = travelled;
+    const double way = std::min(below_surface ? distance : -distance, longest_push * side);
+    points.push_back(contact_at(organ, piece, closest.triangle, closest.on.barycentric,
+                                closest.on.point + (way + contact_margin) * direction, direction));
   }
 }
 

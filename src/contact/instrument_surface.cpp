@@ -27,6 +27,15 @@ InstrumentSurface build_instrument_surface(const TriangleMesh& mesh, bool closed
     surface.normals.push_back(area_normal(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]).stableNormalized());
   }
   surface.tree.build(boxes);
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    const int vertex = static_cast<int>(v);
+    const int triangle = *surface.topology.vertex_triangles.begin(vertex);
+    const Triangle& corners = mesh.triangles[triangle];
+    const int corner = corners[0] == vertex ? 0 : corners[1] == vertex ? 1 : 2;
+    surface.vertex_normals.push_back(
+        pseudonormal(mesh.vertices, mesh.triangles, surface.topology, triangle, static_cast<Feature>(corner))
+            .stableNormalized());
+  }
   return surface;
 }
 

@@ -10,11 +10,17 @@ namespace {
 /// Points that share vertices disturb each other; this many rounds leave less than the contact margin.
 constexpr int rounds = 8;
 
-/// sum w_i^2 / m_i: how easily the point moves. 0 where all its vertices are attached.
+/// sum w_i^2 / m_i: how easily the point moves. 0 where all its vertices are attached. Bounded from below so that no vertex goes more
+/// than twice as far as the point is asked to: one free corner with a small weight beside two attached ones would be thrown.
 double mobility(const ContactPoint& point, const std::vector<double>& inverse_mass) {
   double sum = 0.0;
-  for (int i = 0; i < 3; ++i) sum += point.weights[i] * point.weights[i] * inverse_mass[point.vertices[i]];
-  return sum;
+  double most = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    const double share = point.weights[i] * inverse_mass[point.vertices[i]];
+    sum += point.weights[i] * share;
+    most = std::max(most, share);
+  }
+  return std::max(sum, 0.5 * most);
 }
 
 Vector3 at_point(const ContactPoint& point, const std::vector<Vector3>& of_vertices) {

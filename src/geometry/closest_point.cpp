@@ -57,20 +57,20 @@ ClosestOnTriangle closest_on_triangle(const Vector3& p, const Vector3& a, const 
 }
 
 ClosestOnMesh closest_on_mesh(const std::vector<Vector3>& vertices, const std::vector<Triangle>& triangles,
-                              const AabbTree& tree, const Vector3& p, double reach) {
+                              const AabbTree& tree, const Vector3& p, double reach, int guess) {
   ClosestOnMesh best;
   double bound = reach * reach;
-  tree.for_each_by_distance(p, bound, [&](int triangle, double& nearest) {
-    const Triangle& t = triangles[triangle];
-    const ClosestOnTriangle on =
-        closest_on_triangle(p, vertices[t[0]], vertices[t[1]],
-                            vertices[t[2]]);
+  const auto look_at = [&](int triangle, double& nearest) {
+    const auto& [a, b, c] = triangles[triangle];
+    const ClosestOnTriangle on = closest_on_triangle(p, vertices[a], vertices[b], vertices[c]);
     const double distance = (on.point - p).squaredNorm();
     if (distance < nearest || (distance == nearest && best.triangle >= 0 && triangle < best.triangle)) {
       nearest = distance;
       best = {triangle, distance, on};
     }
-  });
+  };
+  if (guess >= 0) look_at(guess, bound);
+  tree.for_each_by_distance(p, bound, look_at);
   return best;
 }
 

@@ -110,13 +110,11 @@ Workspace build_workspace(const World& world) {
     work.tree.build(work.boxes);
     work.detections.resize(world.pieces.size());
     work.penetrations.resize(world.pieces.size());
-    work.clearances.resize(world.pieces.size());
     work.near.assign(world.pieces.size(), 0);
     const OrganSurface surface = {rest.positions, rest.triangles, rest.topology, rest.component_roots, work.tree};
     for (std::size_t p = 0; p < world.pieces.size(); ++p) {
       prepare(work.detections[p], surface);
       prepare(work.penetrations[p], surface);
-      work.clearances[p].free_until.assign(world.pieces[p].surface.vertices.size(), 0.0);
     }
     work.forces.assign(rest.positions.size(), Vector3::Zero());
     work.gradient.assign(rest.positions.size(), Vector3::Zero());
@@ -129,14 +127,7 @@ Workspace build_workspace(const World& world) {
   return workspace;
 }
 
-void forget(OrganWorkspace& work) {
-  work.travel = 1e300;
-  for (Clearance& clearance : work.clearances) {
-    std::fill(clearance.free_until.begin(), clearance.free_until.end(), 0.0);
-    clearance.shift = 0.0;
-    clearance.turn = 0.0;
-  }
-}
+void forget(OrganWorkspace& work) { work.travel = 1e300; }
 
 void begin_report(const World& world, const Motion& motion, StepReport& report) {
   report.profile = StepProfile();
@@ -193,7 +184,7 @@ void place_instruments(StepContext& context, int substep, int substeps) {
   }
   for (std::size_t p = 0; p < context.world.pieces.size(); ++p) {
     const int instrument = context.world.pieces[p].instrument;
-    Clearance& clearance = context.work().clearances[p];
+    Clearance& clearance = context.state.clearances[p];
     clearance.shift += (workspace.now[instrument].position - workspace.before[instrument].position).norm();
     clearance.turn += angle_between(workspace.before[instrument], workspace.now[instrument]);
   }
@@ -271,7 +262,7 @@ void respond(StepContext& context) {
     add_vertex_contacts(surface, piece.surface, index, pose, work.penetrations[p], work.detections[p],
                         context.state.touching[p], work.points);
     add_edge_contacts(surface, piece.surface, index, pose, work.detections[p], work.points);
-    add_poke_contacts(surface, piece.surface, index, pose, work.clearances[p], work.points);
+    add_poke_contacts(surface, piece.surface, index, pose, context.state.clearances[p], work.points);
   }
   if (work.points.empty()) return;
 
@@ -287,7 +278,7 @@ void respond(StepContext& context) {
   const double way = push_out(work.points, rest.inverse_mass, context.state.positions, held);
   if (rest.elastic()) stop_at_instrument(work.points, rest.inverse_mass, context.state.velocities);
   work.travel += way;
-  for (Clearance& clearance : work.clearances) clearance.shift += way;
+  for (Clearance& clearance : context.state.clearances) clearance.shift += way;
   for (const ContactPoint& point : work.points) {
     record_contact(context, point);
     push_on_instrument(context, point);
@@ -302,7 +293,7 @@ void deform(StepContext& context) {
   element_forces(model.rest, context.state, work.forces, work.gradient);
   const double speed = integrate(model, context.world.gravity, context.dt, work.forces, context.state);
   work.travel += context.dt * speed;
-  for (Clearance& clearance : work.clearances) clearance.shift += context.dt * speed;
+  for (Clearance& clearance : context.state.clearances) clearance.shift += context.dt * speed;
   if (work.points.empty() && speed < sleep_speed) {
     context.state.asleep = true;
     std::fill(context.state.velocities.begin(), context.state.velocities.end(), Vector3::Zero());

@@ -35,6 +35,11 @@ OrganState rest_state(const World& world, int organ) {
     for (std::vector<char>& memory : state.colliding) memory.assign(vertices, 0);
   }
   state.touching.resize(world.pieces.size());
+  for (const InstrumentPiece& piece : world.pieces) {
+    Clearance& clearance = state.clearances.emplace_back();
+    clearance.free_until.assign(piece.surface.vertices.size(), 0.0);
+    clearance.nearest.assign(piece.surface.vertices.size(), -1);
+  }
   state.asleep = world.gravity.isZero();
   return state;
 }

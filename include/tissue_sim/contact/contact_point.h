@@ -33,16 +33,18 @@ void add_vertex_contacts(const OrganSurface& organ, const InstrumentSurface& ins
 void add_edge_contacts(const OrganSurface& organ, const InstrumentSurface& instrument, int piece, const Pose& pose,
                        const Detection& detection, std::vector<ContactPoint>& points);
 
-/// How far instrument vertices are from the organ: a bound that motion uses up. Travel is a sum over all passes so far.
+/// When to look at an instrument vertex again: a bound that motion uses up. Travel is a sum over all passes so far.
 struct Clearance {
-  double shift = 0.0;                ///< m, travel of the tip and of the organ's fastest vertex
-  double turn = 0.0;                 ///< rad
-  std::vector<double> free_until;    ///< m, per instrument vertex: nothing to look at before shift + turn * |vertex| reaches it
+  double shift = 0.0;              ///< m, travel of the tip and of the organ's fastest vertex
+  double turn = 0.0;               ///< rad
+  std::vector<double> free_until;  ///< m, per instrument vertex: nothing to look at before shift + turn * |vertex| reaches it
+  std::vector<int> nearest;        ///< per instrument vertex: the organ triangle found last, or -1
 };
 
 /// Instrument vertices below the organ's surface or within the margin above it: what pokes into a triangle without any organ vertex or
 /// edge being inside, as a tip thinner than a triangle does. With the two above that is every way two surfaces can cross: where
-/// no organ edge crosses the instrument, what reaches below a flat triangle has its lowest point at a vertex.
+/// no organ edge crosses the instrument, what reaches below a flat triangle has its lowest point at a vertex. A poke that would push
+/// against the instrument's own normal there is not one: the nearest surface is then that of another fold.
 void add_poke_contacts(const OrganSurface& organ, const InstrumentSurface& instrument, int piece, const Pose& pose,
                        Clearance& clearance, std::vector<ContactPoint>& points);
 

@@ -14,6 +14,7 @@ struct InstrumentSurface {
   std::vector<Triangle> triangles;
   MeshTopology topology;
   std::vector<Vector3> normals;  ///< unit, one a triangle; zero where it is degenerate
+  std::vector<Vector3> vertex_normals;  ///< unit, one a vertex, angle-weighted
   AabbTree tree;
   Box bounds;
   double reach = 0.0;   ///< of its farthest point from the tip

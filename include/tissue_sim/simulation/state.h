@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "tissue_sim/contact/contact_point.h"
 #include "tissue_sim/geometry/pose.h"
 #include "tissue_sim/simulation/world.h"
 
@@ -16,6 +17,7 @@ struct OrganState {
   std::vector<char> held;                       ///< 1: moved by an instrument and left there (restoration off)
   std::vector<std::vector<char>> colliding;     ///< per piece, one a vertex: the paper's memory; empty for the flood
   std::vector<std::vector<int>> touching;       ///< per piece: vertices that were in contact in the last substep
+  std::vector<Clearance> clearances;            ///< per piece
   bool asleep = true;                           ///< at rest and untouched: nothing to integrate
 };
 

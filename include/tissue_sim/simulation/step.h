@@ -21,8 +21,8 @@ struct Motion {
   std::vector<InstrumentMotion> instruments;
 };
 
-/// Room for one organ's step. Holds nothing that the next step reads but the tree and the clearances, which are bounds that only
-/// save work: without them the same bits come out.
+/// Room for one organ's step. Holds nothing that changes what the next step does: how far the tree's boxes have been outrun saves work
+/// only.
 struct OrganWorkspace {
   std::vector<Box> boxes;
   AabbTree tree;                ///< of the organ's triangles, its boxes grown by `slack`
@@ -30,7 +30,6 @@ struct OrganWorkspace {
   double travel = 0.0;          ///< m, at most this far has any vertex gone since the tree was fitted
   std::vector<Detection> detections;      ///< per piece
   std::vector<Penetration> penetrations;  ///< per piece
-  std::vector<Clearance> clearances;      ///< per piece
   std::vector<char> near;                 ///< per piece: its box and the organ's overlap in this substep
   std::vector<ContactPoint> points;
   std::vector<Vector3> forces;
@@ -50,7 +49,7 @@ struct Workspace {
 
 Workspace build_workspace(const World& world);
 
-/// Forgets what the workspace knows of an organ's positions: after they were set from outside the step.
+/// To be called after an organ was put somewhere from outside the step: its tree no longer holds it.
 void forget(OrganWorkspace& organ);
 
 /// One step. `report.step` and `report.stamp` are the caller's; everything else in the report is written.
