@@ -6,12 +6,22 @@ namespace tissue_sim {
 
 namespace {
 
-/// +1 or -1: the side on which the line p + s * along passes the rim from corner a to corner b.
+/// Of the product of its three lengths: below this a side is rounding error.
+constexpr double rounding = 1e-15;
+
+/// +1 or -1: the side on which the line p + s * along passes the rim from corner a to corner b. A line through the rim
+/// is taken to pass where it would after a small shift by (d, d^2, d^3): the rims of a corner then agree, so that a
+/// line through a corner hits one of its triangles and not none or three.
 int side_of_rim(const Vector3& p, const Vector3& along, const Vector3& a, const Vector3& b, bool ascending) {
-  const Vector3& low = ascending ? a : b;
-  const Vector3& high = ascending ? b : a;
-  const int side = along.dot((low - p).cross(high - p)) >= 0.0 ? 1 : -1;
-  return ascending ? side : -side;
+  const Vector3 to_low = (ascending ? a : b) - p;
+  const Vector3 to_high = (ascending ? b : a) - p;
+  double side = along.dot(to_low.cross(to_high));
+  const double squares = along.squaredNorm() * to_low.squaredNorm() * to_high.squaredNorm();
+  if (side * side <= rounding * rounding * squares) {
+    const Vector3 by_shift = along.cross(to_high - to_low);
+    side = by_shift.x() != 0.0 ? by_shift.x() : by_shift.y() != 0.0 ? by_shift.y() : by_shift.z();
+  }
+  return (side >= 0.0) == ascending ? 1 : -1;
 }
 
 }  // namespace

@@ -12,9 +12,10 @@ struct EdgeTriangleHit {
 
 /// Does the edge p-q go through the triangle (corners `points`, which are vertices `indices` of their mesh)?
 ///
-/// An edge through the rim between two triangles hits exactly one of them: the side of the rim is computed in the order
-/// of the vertex indices, so both triangles see the same number with opposite sign, and zero counts as positive.
-/// An end in the triangle's plane counts as in front of it. No hit: degenerate triangles, an edge in the plane, NaN.
+/// An edge through the rim between two triangles hits exactly one of them, and so does one through a corner of a convex
+/// surface: the side of the rim is computed in the order of the vertex indices, so both triangles see the same number
+/// with opposite sign, and what is zero within rounding is decided as after one small shift, the same for every rim. An
+/// end in the triangle's plane counts as in front of it. No hit: degenerate triangles, an edge in the plane, NaN.
 EdgeTriangleHit hit_edge_triangle(const Vector3& p, const Vector3& q, const std::array<const Vector3*, 3>& points,
                                   const Triangle& indices);
 
