@@ -12,7 +12,12 @@ constexpr int rounds = 8;
 
 /// sum w_i^2 / m_i: how easily the point moves. 0 where all its vertices are attached. Bounded from below so that no vertex goes more
 /// than twice as far as the point is asked to: one free corner with a small weight beside two attached ones would be thrown.
-double mobility(const ContactPoint& point, const std::vector<double>& inverse_mass) {
+struct Mobility {
+  double ease = 0.0;
+  bool bounded = false;
+};
+
+Mobility mobility(const ContactPoint& point, const std::vector<double>& inverse_mass) {
   double sum = 0.0;
   double most = 0.0;
   for (int i = 0; i < 3; ++i) {
@@ -20,7 +25,7 @@ double mobility(const ContactPoint& point, const std::vector<double>& inverse_ma
     sum += point.weights[i] * share;
     most = std::max(most, share);
   }
-  return std::max(sum, 0.5 * most);
+  return {std::max(sum, 0.5 * most), sum < 0.5 * most};
 }
 
 Vector3 at_point(const ContactPoint& point, const std::vector<Vector3>& of_vertices) {
@@ -37,8 +42,9 @@ double push_out(const std::vector<ContactPoint>& points, const std::vector<doubl
     double farthest_of_round = 0.0;
     for (const ContactPoint& point : points) {
       const double behind = point.target - point.direction.dot(at_point(point, positions));
-      const double ease = mobility(point, inverse_mass);
+      const auto [ease, bounded] = mobility(point, inverse_mass);
       if (!(behind > 0.0) || !(ease > 0.0)) continue;
+      if (bounded && round > 0) continue;  // eight rounds would throw the vertex after all, 16 times as far
       for (int i = 0; i < 3; ++i) {
         const int vertex = point.vertices[i];
         const double way = behind * point.weights[i] * inverse_mass[vertex] / ease;
@@ -59,7 +65,7 @@ void stop_at_instrument(std::vector<ContactPoint>& points, const std::vector<dou
   for (ContactPoint& point : points) point.impulse = 0.0;
   for (int round = 0; round < rounds; ++round) {
     for (ContactPoint& point : points) {
-      const double ease = mobility(point, inverse_mass);
+      const double ease = mobility(point, inverse_mass).ease;
       if (!(ease > 0.0)) continue;
       const double approach = point.direction.dot(point.instrument_velocity - at_point(point, velocities));
       const double impulse = std::max(0.0, point.impulse + approach / ease);
