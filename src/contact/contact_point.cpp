@@ -12,7 +12,7 @@ namespace {
 /// nearest surface is far, and pulled over at once it folds.
 constexpr double longest_push = 0.5;
 
-/// Of the same: the motion after which a vertex that faces away from the nearest surface is looked at again.
+/// Of the same: the motion after which a vertex that was no poke is looked at again.
 constexpr double recheck = 0.05;
 
 double longest_side(const OrganSurface& organ, int triangle) {
@@ -92,8 +92,8 @@ void add_edge_contacts(const OrganSurface& organ, const InstrumentSurface& instr
 }
 
 void add_poke_contacts(const OrganSurface& organ, const InstrumentSurface& instrument, int piece, const Pose& pose,
-                       Clearance& clearance, std::vector<ContactPoint>& points) {
-  for (std::size_t u = 0; u < instrument.vertices.size(); ++u) {
+                       const std::vector<int>& vertices, Clearance& clearance, std::vector<ContactPoint>& points) {
+  for (const int u : vertices) {
     const double travelled = clearance.shift + clearance.turn * instrument.vertices[u].norm();
     if (travelled < clearance.free_until[u]) continue;
 
@@ -109,16 +109,20 @@ void add_poke_contacts(const OrganSurface& organ, const InstrumentSurface& instr
         pseudonormal(organ.positions, organ.triangles, organ.topology, closest.triangle, closest.on.feature);
     const Vector3 above = tip - closest.on.point;
     const bool below_surface = !(above.dot(outward) > 0.0);
+    if (!below_surface) clearance.first_touch[u] = travelled + distance;
     if (!below_surface && !(distance < contact_margin)) continue;
 
     const Vector3 direction = distance < 1e-9   ? Vector3(-outward.stableNormalized())
                               : below_surface ? Vector3(above / distance)
                                               : Vector3(-above / distance);
     const double side = longest_side(organ, closest.triangle);
-    if (!(direction.dot(pose.orientation * instrument.vertex_normals[u]) > 0.0)) {
+    const bool with_normal = direction.dot(pose.orientation * instrument.vertex_normals[u]) > 0.0;
+    const bool within_reach = !below_surface || distance < travelled - clearance.first_touch[u] + contact_margin;
+    if (!with_normal || !within_reach) {
       clearance.free_until[u] = travelled + recheck * side;
       continue;
     }
+    if (below_surface) clearance.first_touch[u] = -1e300;
     clearance.free_until[u] = travelled;
     const double way = std::min(below_surface ? distance : -distance, longest_push * side);
     points.push_back(contact_at(organ, piece, closest.triangle, closest.on.barycentric,

@@ -9,6 +9,31 @@ namespace tissue_sim {
 namespace {
 /// m; nearer to the surface than this, the way to the closest point is rounding and the surface's normal is used.
 constexpr double on_surface = 1e-9;
+
+/// rad; triangles that turn from the vertex's normal by more than this meet in a corner and do not stand for a curve.
+constexpr double corner_angle = 0.5;
+
+double angle_between(const Vector3& unit_a, const Vector3& unit_b) {
+  return std::acos(std::clamp(unit_a.dot(unit_b), -1.0, 1.0));
+}
+
+/// Along an edge of length e the normal of a curve of radius r turns by e / r.
+double radius_at(const InstrumentSurface& surface, int vertex) {
+  const Vector3& normal = surface.vertex_normals[vertex];
+  const FlatLists& triangles = surface.topology.vertex_triangles;
+  for (const int* t = triangles.begin(vertex); t != triangles.end(vertex); ++t) {
+    if (angle_between(surface.normals[*t], normal) > corner_angle) return 0.0;
+  }
+  double smallest = std::numeric_limits<double>::max();
+  const FlatLists& edges = surface.topology.vertex_edges;
+  for (const int* e = edges.begin(vertex); e != edges.end(vertex); ++e) {
+    const auto& [a, b] = surface.topology.edges[*e];
+    const double angle = angle_between(surface.vertex_normals[a], surface.vertex_normals[b]);
+    smallest = std::min(smallest, (surface.vertices[a] - surface.vertices[b]).norm() / std::max(angle, 1e-9));
+  }
+  return smallest;
+}
+
 }  // namespace
 
 InstrumentSurface build_instrument_surface(const TriangleMesh& mesh, bool closed) {
@@ -36,7 +61,18 @@ InstrumentSurface build_instrument_surface(const TriangleMesh& mesh, bool closed
         pseudonormal(mesh.vertices, mesh.triangles, surface.topology, triangle, static_cast<Feature>(corner))
             .stableNormalized());
   }
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    surface.radii.push_back(radius_at(surface, static_cast<int>(v)));
+  }
   return surface;
+}
+
+std::vector<int> sharper_than(const InstrumentSurface& surface, double radius) {
+  std::vector<int> vertices;
+  for (std::size_t v = 0; v < surface.radii.size(); ++v) {
+    if (surface.radii[v] < radius) vertices.push_back(static_cast<int>(v));
+  }
+  return vertices;
 }
 
 Box scene_bounds(const Box& box, const Pose& pose) {

@@ -261,8 +261,10 @@ void respond(StepContext& context) {
     const Pose& pose = context.workspace.now[piece.instrument];
     add_vertex_contacts(surface, piece.surface, index, pose, work.penetrations[p], work.detections[p],
                         context.state.touching[p], work.points);
+    const std::vector<int>& poking = context.model().poking[p];
+    if (poking.empty()) continue;  // nowhere thinner than the organ's mesh: its vertices feel all of it
     add_edge_contacts(surface, piece.surface, index, pose, work.detections[p], work.points);
-    add_poke_contacts(surface, piece.surface, index, pose, context.state.clearances[p], work.points);
+    add_poke_contacts(surface, piece.surface, index, pose, poking, context.state.clearances[p], work.points);
   }
   if (work.points.empty()) return;
 

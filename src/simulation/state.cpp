@@ -35,11 +35,7 @@ OrganState rest_state(const World& world, int organ) {
     for (std::vector<char>& memory : state.colliding) memory.assign(vertices, 0);
   }
   state.touching.resize(world.pieces.size());
-  for (const InstrumentPiece& piece : world.pieces) {
-    Clearance& clearance = state.clearances.emplace_back();
-    clearance.free_until.assign(piece.surface.vertices.size(), 0.0);
-    clearance.nearest.assign(piece.surface.vertices.size(), -1);
-  }
+  for (const InstrumentPiece& piece : world.pieces) state.clearances.emplace_back(piece.surface.vertices.size());
   state.asleep = world.gravity.isZero();
   return state;
 }

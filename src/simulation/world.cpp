@@ -17,6 +17,10 @@ constexpr double edge_fraction = 0.25;
 /// ... and this part of its own thickness, so that nothing is passed over and the nearest way out is the way it came.
 constexpr double thickness_fraction = 0.25;
 
+/// Of a mean organ edge: an instrument curved less sharply than this reaches at most a 24th of an edge below the surface between two
+/// vertices that it touches.
+constexpr double sharp = 3.0;
+
 void refuse_if_too_stiff(const Scene& scene, const Organ& organ, const RestShape& rest) {
   const int substeps = substeps_for(rest, scene.time_step);
   if (substeps <= scene.max_substeps) return;
@@ -57,6 +61,9 @@ World build_world(const Scene& scene) {
     // A part flatter than a hundredth of an edge is a sheet: cutting the motion by its thickness would never end.
     model.motion_limit = std::max(std::min(edge_fraction * model.rest.mean_edge, thickness_fraction * thinnest),
                                   0.01 * model.rest.mean_edge);
+    for (const InstrumentPiece& piece : world.pieces) {
+      model.poking.push_back(sharper_than(piece.surface, sharp * model.rest.mean_edge));
+    }
     refuse_if_too_stiff(scene, organ, model.rest);
     world.organs.push_back(std::move(model));
   }

@@ -98,7 +98,7 @@ Scene paper_scene(const PaperTest& test, Approach approach) {
   organ.restoration = approach != Approach::without_restoration;
   organ.depth = DepthScheme::paper;
   organ.material = {1000.0, 0.45, 1060.0, 0.1, 10.0};
-  organ.wall_thickness = 0.005;
+  organ.wall_thickness = 0.001;
   organ.attached = farthest_tenth(organ.mesh, paper_path().front());
   soften_to_one_substep(organ);
   scene.organs.push_back(organ);

@@ -201,7 +201,10 @@ RestShape build_rest_shape(const Organ& organ) {
   for (std::size_t v = 0; v < shape.mass.size(); ++v) {
     shape.inverse_mass.push_back(shape.attached[v] ? 0.0 : 1.0 / shape.mass[v]);
   }
-  if (shape.elastic()) shape.stable_substep = stable_substep(shape, safety);
+  if (shape.elastic()) {
+    shape.stable_substep = stable_substep(shape, safety);
+    shape.stiffest_element = stiffest_element(shape, shape.positions);
+  }
   return shape;
 }
 

@@ -71,7 +71,27 @@ double largest_eigenvalue(const RestShape& shape, Product&& product) {
   return eigenvalue;
 }
 
+template <class Kind>
+double stiffest_of(const std::vector<Kind>& elements, const RestShape& shape, const std::vector<Vector3>& positions) {
+  ElementVectors<Kind> gradient;
+  double stiffest = 0.0;
+  for (const Kind& element : elements) {
+    element.evaluate(gather(element, positions), gradient);
+    double slope = 0.0;
+    for (std::size_t i = 0; i < Kind::size; ++i) {
+      slope += gradient[i].squaredNorm() * shape.inverse_mass[element.vertices[i]];
+    }
+    stiffest = std::max(stiffest, element.stiffness * slope);
+  }
+  return stiffest;
+}
+
 }  // namespace
+
+double stiffest_element(const RestShape& shape, const std::vector<Vector3>& positions) {
+  return std::max({stiffest_of(shape.distances, shape, positions), stiffest_of(shape.areas, shape, positions),
+                   stiffest_of(shape.flaps, shape, positions)});
+}
 
 void apply_mass_floor(double fraction, RestShape& shape) {
   std::vector<double> sums(shape.positions.size(), 0.0);

@@ -38,14 +38,22 @@ struct Clearance {
   double shift = 0.0;              ///< m, travel of the tip and of the organ's fastest vertex
   double turn = 0.0;               ///< rad
   std::vector<double> free_until;  ///< m, per instrument vertex: nothing to look at before shift + turn * |vertex| reaches it
+  std::vector<double> first_touch; ///< m, per instrument vertex: the travel at which it could first have reached the surface
   std::vector<int> nearest;        ///< per instrument vertex: the organ triangle found last, or -1
+
+  explicit Clearance(std::size_t vertices = 0)
+      : free_until(vertices, 0.0), first_touch(vertices, -1e300), nearest(vertices, -1) {}
 };
 
 /// Instrument vertices below the organ's surface or within the margin above it: what pokes into a triangle without any organ vertex or
 /// edge being inside, as a tip thinner than a triangle does. With the two above that is every way two surfaces can cross: where
-/// no organ edge crosses the instrument, what reaches below a flat triangle has its lowest point at a vertex. A poke that would push
-/// against the instrument's own normal there is not one: the nearest surface is then that of another fold.
+/// no organ edge crosses the instrument, what reaches below a flat triangle has its lowest point at a vertex. Where the
+/// surface is folded into itself it has no inside, so what would push against the instrument's own normal, or is deeper than it can
+/// have come since it was outside, is no poke.
+///
+/// Looks at `vertices` of the instrument only: where it is curved no more sharply than a few organ edges, colliding vertices are dense
+/// enough, and what it reaches between them is a small part of an edge.
 void add_poke_contacts(const OrganSurface& organ, const InstrumentSurface& instrument, int piece, const Pose& pose,
-                       Clearance& clearance, std::vector<ContactPoint>& points);
+                       const std::vector<int>& vertices, Clearance& clearance, std::vector<ContactPoint>& points);
 
 }  // namespace tissue_sim

@@ -15,6 +15,7 @@ struct InstrumentSurface {
   MeshTopology topology;
   std::vector<Vector3> normals;  ///< unit, one a triangle; zero where it is degenerate
   std::vector<Vector3> vertex_normals;  ///< unit, one a vertex, angle-weighted
+  std::vector<double> radii;            ///< m, one a vertex: of the curve of the surface there, 0 at corners and sharp edges
   AabbTree tree;
   Box bounds;
   double reach = 0.0;   ///< of its farthest point from the tip
@@ -22,6 +23,9 @@ struct InstrumentSurface {
 };
 
 InstrumentSurface build_instrument_surface(const TriangleMesh& mesh, bool closed);
+
+/// The vertices where the surface is curved more sharply than `radius` (m).
+std::vector<int> sharper_than(const InstrumentSurface& surface, double radius);
 
 /// The smallest box in the scene's frame that holds a box of the tip frame at `pose`.
 Box scene_bounds(const Box& box, const Pose& pose);

@@ -15,6 +15,7 @@ struct OrganModel {
   CollidingSet colliding_set = CollidingSet::flood;
   DepthScheme depth = DepthScheme::exact;
   double drag = 0.0;          ///< 1/s
+  std::vector<std::vector<int>> poking;  ///< per piece: its vertices that may poke into a triangle of this organ
   double motion_limit = 0.0;  ///< m, the farthest an instrument may move between two contact passes
 };
 

@@ -33,15 +33,29 @@ ElementVectors<Kind> gather(const Kind& element, const std::vector<Vector3>& of_
   return of_element;
 }
 
+/// What bounds the stiffness of stretched elements: areas and volumes stiffen with every stretch, and a substep that is stable at rest is
+/// not for ever. k sum |grad_i C|^2 / m_i, the square of the frequency of the element alone, counts up to `stiffest` only: an element
+/// beyond it is softened to it.
+struct StiffnessLimit {
+  const std::vector<double>& inverse_mass;  ///< 1/kg, one a vertex
+  double stiffest;                          ///< 1/s^2
+};
+
 /// Adds the element's forces (N). Returns its energy (J).
 template <class Kind>
-double add_forces(const Kind& element, const std::vector<Vector3>& positions, const std::vector<Vector3>& velocities,
-                  std::vector<Vector3>& forces) {
+double add_forces(const Kind& element, const StiffnessLimit& limit, const std::vector<Vector3>& positions,
+                  const std::vector<Vector3>& velocities, std::vector<Vector3>& forces) {
   ElementVectors<Kind> gradient;
   const double c = element.evaluate(gather(element, positions), gradient);
   double rate = 0.0;
-  for (std::size_t i = 0; i < Kind::size; ++i) rate += gradient[i].dot(velocities[element.vertices[i]]);
-  const double pull = element.stiffness * c + element.damping * rate;
+  double slope = 0.0;
+  for (std::size_t i = 0; i < Kind::size; ++i) {
+    rate += gradient[i].dot(velocities[element.vertices[i]]);
+    slope += gradient[i].squaredNorm() * limit.inverse_mass[element.vertices[i]];
+  }
+  const double squared_frequency = element.stiffness * slope;
+  const double softened = squared_frequency > limit.stiffest ? limit.stiffest / squared_frequency : 1.0;
+  const double pull = softened * (element.stiffness * c + element.damping * rate);
   for (std::size_t i = 0; i < Kind::size; ++i) forces[element.vertices[i]] -= pull * gradient[i];
   return 0.5 * element.stiffness * c * c;
 }

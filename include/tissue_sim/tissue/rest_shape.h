@@ -29,7 +29,8 @@ struct RestShape {
   std::vector<AreaElement> areas;
   std::vector<VolumeElement> flaps;
   EnclosedVolume enclosed;
-  double stable_substep = 0.0;  ///< s; 0: nothing to integrate
+  double stable_substep = 0.0;   ///< s; 0: nothing to integrate
+  double stiffest_element = 0.0;  ///< 1/s^2, see stiffest_element()
 
   bool elastic() const { return !distances.empty(); }
 };

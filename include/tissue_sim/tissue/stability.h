@@ -14,4 +14,8 @@ void apply_mass_floor(double fraction, RestShape& shape);
 /// taken at rest by power iteration.
 double stable_substep(const RestShape& shape, double safety);
 
+/// The largest k sum |grad_i C|^2 / m_i of an element at the given positions, 1/s^2: the square of the frequency at which the fastest
+/// element alone would vibrate. Areas and volumes stiffen when they are stretched.
+double stiffest_element(const RestShape& shape, const std::vector<Vector3>& positions);
+
 }  // namespace tissue_sim

@@ -1,0 +1,231 @@
+#include "tissue_sim/tissue/stability.h"
+
+#include <gtest/gtest.h>
+
+#include "geometry/twins.h"
+#include "tissue_sim/geometry/primitives.h"
+
+namespace tissue_sim {
+namespace {
+
+constexpr double safety = 0.4;
+
+Organ organ_of(const TriangleMesh& mesh, double damping) {
+  Organ organ;
+  organ.mesh = mesh;
+  organ.model = Model::surface;
+  organ.material.young = 10e3;
+  organ.material.poisson = 0.45;
+  organ.material.density = 1060.0;
+  organ.material.damping = damping;
+  organ.wall_thickness = 0.002;
+  return organ;
+}
+
+/// Every vertex as light as a third of the wall of its triangles.
+std::vector<double> wall_masses(const Organ& organ) {
+  std::vector<double> mass(organ.mesh.vertices.size(), 0.0);
+  for (const auto& [a, b, c] : organ.mesh.triangles) {
+    const double area =
+        0.5 * area_normal(organ.mesh.vertices[a], organ.mesh.vertices[b], organ.mesh.vertices[c]).norm();
+    for (const int v : {a, b, c}) mass[v] += organ.material.density * organ.wall_thickness * area / 3.0;
+  }
+  return mass;
+}
+
+template <class Kind>
+void add_row_sums(const std::vector<Kind>& elements, const std::vector<Vector3>& x, std::vector<double>& sums) {
+  ElementVectors<Kind> gradient;
+  for (const Kind& element : elements) {
+    element.evaluate(gather(element, x), gradient);
+    for (std::size_t i = 0; i < Kind::size; ++i) {
+      for (std::size_t j = 0; j < Kind::size; ++j) {
+        sums[element.vertices[i]] += element.stiffness * gradient[i].norm() * gradient[j].norm();
+      }
+    }
+  }
+}
+
+/// The largest of the bounds on omega^2 of the vertices.
+double fastest(const RestShape& shape, const std::vector<double>& mass) {
+  std::vector<double> sums(mass.size(), 0.0);
+  add_row_sums(shape.distances, shape.positions, sums);
+  add_row_sums(shape.areas, shape.positions, sums);
+  add_row_sums(shape.flaps, shape.positions, sums);
+  double bound = 0.0;
+  for (std::size_t i = 0; i < mass.size(); ++i) {
+    if (!shape.attached[i]) bound = std::max(bound, sums[i] / mass[i]);
+  }
+  return bound;
+}
+
+/// The plainest integrator: v += dt f / m, x += dt v, over all elements.
+struct Motion {
+  const RestShape& shape;
+  std::vector<Vector3> x;
+  std::vector<Vector3> v;
+  std::vector<Vector3> forces;
+  std::vector<Vector3> gradient;
+
+  explicit Motion(const RestShape& rest)
+      : shape(rest), x(rest.positions), v(x.size(), Vector3::Zero()), forces(x.size()), gradient(x.size()) {}
+
+  /// Kinetic and elastic energy after one substep.
+  double advance(double dt) {
+    std::fill(forces.begin(), forces.end(), Vector3::Zero());
+    double energy = 0.0;
+    for (const DistanceElement& e : shape.distances) energy += add_forces(e, x, v, forces);
+    for (const AreaElement& e : shape.areas) energy += add_forces(e, x, v, forces);
+    for (const VolumeElement& e : shape.flaps) energy += add_forces(e, x, v, forces);
+    const double c = shape.enclosed.evaluate(x, shape.triangles, gradient);
+    energy += 0.5 * shape.enclosed.stiffness * c * c;
+    double rate = 0.0;
+    for (std::size_t i = 0; i < x.size(); ++i) rate += gradient[i].dot(v[i]);
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      energy += 0.5 * shape.mass[i] * v[i].squaredNorm();
+      forces[i] -= (shape.enclosed.stiffness * c + shape.enclosed.damping * rate) * gradient[i];
+      v[i] += dt * shape.inverse_mass[i] * forces[i];
+      x[i] += dt * v[i];
+    }
+    return energy;
+  }
+
+  void start(double speed) {
+    Random random(1);
+    for (std::size_t i = 0; i < v.size(); ++i) {
+      if (!shape.attached[i]) v[i] = speed * random_direction(random);
+    }
+  }
+};
+
+TEST(MassFloor, AddsLittleAndSlowsTheFastest) {
+  for (const TriangleMesh& mesh : {make_sphere(0.05, 32), make_torus(0.05, 0.02, 16), make_cylinder(0.02, 0.1, 24)}) {
+    const Organ organ = organ_of(mesh, 0.1);
+    const RestShape shape = build_rest_shape(organ);
+    const std::vector<double> bare = wall_masses(organ);
+    double total = 0.0;
+    double added = 0.0;
+    for (std::size_t i = 0; i < bare.size(); ++i) {
+      EXPECT_GE(shape.mass[i], bare[i] * (1.0 - 1e-12));
+      total += bare[i];
+      added += shape.mass[i] - bare[i];
+    }
+    EXPECT_LE(added, 0.005 * total * (1.0 + 1e-9));
+    EXPECT_NEAR(added, shape.added_mass, 1e-9 * total);
+    EXPECT_LT(fastest(shape, shape.mass), fastest(shape, bare));
+  }
+}
+
+TEST(MassFloor, BringsTheRaisedToOneBound) {
+  RestShape shape = build_rest_shape(organ_of(make_sphere(0.05, 32), 0.1));
+  const std::vector<double> bare = wall_masses(organ_of(make_sphere(0.05, 32), 0.1));
+  shape.mass = bare;
+  shape.added_mass = 0.0;
+  apply_mass_floor(0.02, shape);
+  std::vector<double> sums(bare.size(), 0.0);
+  add_row_sums(shape.distances, shape.positions, sums);
+  add_row_sums(shape.areas, shape.positions, sums);
+  add_row_sums(shape.flaps, shape.positions, sums);
+  const double bound = fastest(shape, shape.mass);
+  int raised = 0;
+  for (std::size_t i = 0; i < bare.size(); ++i) {
+    if (shape.mass[i] == bare[i]) continue;
+    ++raised;
+    EXPECT_NEAR(sums[i] / shape.mass[i], bound, 1e-9 * bound);
+  }
+  EXPECT_GT(raised, 0);
+  EXPECT_LT(raised, static_cast<int>(bare.size()) / 2);
+}
+
+TEST(MassFloor, AttachedVerticesAreNotPaidFor) {
+  Organ organ = organ_of(make_sphere(0.05, 32), 0.1);
+  organ.attached = {0};  // a pole, the lightest and stiffest vertex
+  EXPECT_EQ(build_rest_shape(organ).mass[0], wall_masses(organ)[0]);
+}
+
+TEST(StableSubstep, OfOneSpringIsTheTextbooks) {
+  // Two masses m on a spring: omega^2 = 2 k / (m D0^2); without damping the symplectic step is stable below 2 / omega.
+  RestShape shape;
+  shape.positions = {Vector3::Zero(), Vector3(0.5, 0, 0)};
+  shape.attached = {0, 0};
+  shape.mass = {2.0, 2.0};
+  shape.inverse_mass = {0.5, 0.5};
+  DistanceElement spring;
+  spring.vertices = {0, 1};
+  spring.rest = spring.scale = 0.5;
+  spring.stiffness = 4.0;
+  shape.distances = {spring};
+  const double omega = std::sqrt(2.0 * 4.0 / (2.0 * 0.25));
+  EXPECT_NEAR(stable_substep(shape, 1.0), 2.0 / omega, 1e-9);
+  EXPECT_NEAR(stable_substep(shape, 0.4), 0.8 / omega, 1e-9);
+  EXPECT_NEAR(stiffest_element(shape, shape.positions), omega * omega, 1e-9);
+
+  // With damping d: (dt omega / 2)^2 + dt lambda / 2 = 1, lambda = 2 d / (m D0^2).
+  shape.distances[0].damping = 1.0;
+  const double lambda = 2.0 * 1.0 / (2.0 * 0.25);
+  const double dt = stable_substep(shape, 1.0);
+  EXPECT_NEAR(std::pow(0.5 * dt * omega, 2) + 0.5 * dt * lambda, 1.0, 1e-9);
+}
+
+TEST(StableSubstep, NothingToIntegrateNeedsNone) {
+  RestShape shape;
+  shape.positions = {Vector3::Zero()};
+  shape.attached = {0};
+  shape.mass = shape.inverse_mass = {1.0};
+  EXPECT_EQ(stable_substep(shape, 0.4), 0.0);
+}
+
+TEST(StableSubstep, NeverGainsEnergy) {
+  for (const double damping : {0.0, 0.1, 1.0}) {
+    const RestShape shape = build_rest_shape(organ_of(make_sphere(0.05, 8), damping));
+    const double dt = stable_substep(shape, safety);
+    EXPECT_DOUBLE_EQ(dt, shape.stable_substep);
+    Motion motion(shape);
+    motion.start(0.05);
+    const double at_start = motion.advance(dt);
+    double highest = at_start;
+    double last = at_start;
+    for (int substep = 0; substep < 10000; ++substep) {
+      last = motion.advance(dt);
+      highest = std::max(highest, last);
+    }
+    // The symplectic step keeps an energy that differs from this one by up to dt omega / 2 = 0.4 of it, and does not
+    // drift.
+    EXPECT_LT(highest, at_start / (1.0 - safety));
+    if (damping > 0.0) {
+      EXPECT_LT(last, 0.6 * at_start);
+    }
+  }
+}
+
+TEST(StableSubstep, ItsBoundIsWhereItBlowsUp) {
+  for (const double damping : {0.0, 0.1, 1.0}) {
+    const RestShape shape = build_rest_shape(organ_of(make_sphere(0.05, 8), damping));
+    for (const double factor : {0.95, 1.05}) {
+      const double dt = factor * stable_substep(shape, 1.0);
+      Motion motion(shape);
+      motion.start(1e-9);  // so small that the elements are springs
+      const double at_start = motion.advance(dt);
+      double highest = 0.0;
+      for (int substep = 0; substep < 1000 && highest < 1e9 * at_start; ++substep) {
+        highest = std::max(highest, motion.advance(dt));
+      }
+      if (factor < 1.0) {
+        EXPECT_LT(highest, 30.0 * at_start) << "damping " << damping;
+      } else {
+        EXPECT_GT(highest, 1e6 * at_start) << "damping " << damping;
+      }
+    }
+  }
+}
+
+TEST(StiffestElement, GrowsWithStretching) {
+  const RestShape shape = build_rest_shape(organ_of(make_octasphere(0.05, 2), 0.1));
+  EXPECT_EQ(stiffest_element(shape, shape.positions), shape.stiffest_element);
+  std::vector<Vector3> x = shape.positions;
+  for (Vector3& p : x) p *= 3.0;
+  EXPECT_GT(stiffest_element(shape, x), shape.stiffest_element);
+}
+
+}  // namespace
+}  // namespace tissue_sim
