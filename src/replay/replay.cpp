@@ -211,7 +211,7 @@ class Replay {
     ReplayRow row;
     row.t = static_cast<double>(report.stamp) * 1e-9;
     row.contacts = report.contacts.size();
-    for (const Contact& contact : report.contacts) {
+    for (const OrganContact& contact : report.contacts) {
       row.depth = std::max(row.depth, contact.depth);
       summary_.non_finite += non_finite(contact.point) + non_finite(contact.direction) + non_finite(contact.force) +
                              (std::isfinite(contact.depth) ? 0U : 1U);

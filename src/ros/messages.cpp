@@ -101,13 +101,13 @@ visualization_msgs::Marker organ_marker(const std_msgs::Header& header, const Or
   return m;
 }
 
-visualization_msgs::Marker contacts_marker(const std_msgs::Header& header, const std::vector<Contact>& contacts) {
+visualization_msgs::Marker contacts_marker(const std_msgs::Header& header, const std::vector<OrganContact>& contacts) {
   auto m = marker(header, "contacts", 0, visualization_msgs::Marker::SPHERE_LIST);
   // rviz refuses a list without points.
   if (contacts.empty()) m.action = visualization_msgs::Marker::DELETE;
   m.scale.x = m.scale.y = m.scale.z = 2.0 * contact_radius;
   m.color = colour(1.0F, 0.85F, 0.1F);
-  for (const Contact& contact : contacts) m.points.push_back(to_point(contact.point));
+  for (const OrganContact& contact : contacts) m.points.push_back(to_point(contact.point));
   return m;
 }
 
@@ -203,9 +203,9 @@ Contacts contacts_message(const Scene& scene, const StepReport& report) {
   message.header.stamp = to_ros_time(report.stamp);
   message.step = report.step;
   message.contacts.reserve(report.contacts.size());
-  for (const Contact& contact : report.contacts) {
+  for (const OrganContact& contact : report.contacts) {
     const Instrument& instrument = scene.instruments[static_cast<std::size_t>(contact.instrument)];
-    ContactMessage out;
+    Contact out;
     out.organ = scene.organs[static_cast<std::size_t>(contact.organ)].name;
     out.instrument = instrument.name;
     out.link = instrument.parts[static_cast<std::size_t>(contact.part)].link;

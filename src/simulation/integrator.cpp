@@ -7,9 +7,9 @@ namespace tissue_sim {
 
 namespace {
 
-/// How much stiffer than at rest elements may become, as squared frequency: twice the frequency of a substep with the safety of 0.4 is
-/// still below the limit of stability.
-constexpr double covered_stiffening = 4.0;
+/// How much stiffer than the stiffest at rest an element may become, as squared frequency. 4 would do for one mode at the safety of 0.4, but
+/// around a vertex many stretch at once: 4 let a sphere's poles run away when it was pressed flat, 2 only just did not.
+constexpr double covered_stiffening = 1.5;
 
 }  // namespace
 

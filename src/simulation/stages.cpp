@@ -71,7 +71,7 @@ void record_contact(StepContext& context, const ContactPoint& point) {
     work.contacts.back().force.setZero();
   }
   const InstrumentPiece& piece = context.world.pieces[point.piece];
-  Contact& contact = work.contacts[work.contact_of[place]];
+  OrganContact& contact = work.contacts[work.contact_of[place]];
   contact.organ = context.organ;
   contact.instrument = piece.instrument;
   contact.part = piece.part;
@@ -321,7 +321,7 @@ void check_health(StepContext& context) {
 void report_contacts(StepContext& context) {
   OrganWorkspace& work = context.work();
   std::fill(context.state.depths.begin(), context.state.depths.end(), 0.0);
-  for (Contact& contact : work.contacts) {
+  for (OrganContact& contact : work.contacts) {
     const Triangle& corners = context.model().rest.triangles[contact.triangle];
     Vector3 rest = Vector3::Zero();
     contact.point.setZero();

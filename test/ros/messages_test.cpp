@@ -65,7 +65,7 @@ TEST(Messages, ContactsAreNamed) {
   StepReport report;
   report.step = 7;
   report.stamp = 2'000'000'001;
-  Contact contact;
+  OrganContact contact;
   contact.triangle = 5;
   contact.barycentric = {0.25, 0.5, 0.25};
   contact.point = {0.0, 0.0, 0.03};

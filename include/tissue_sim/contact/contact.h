@@ -5,7 +5,7 @@
 namespace tissue_sim {
 
 /// A point of an organ's surface that an instrument presses on. Scene frame, SI units.
-struct Contact {
+struct OrganContact {
   int organ = 0;
   int instrument = 0;
   int part = 0;                            ///< of the instrument

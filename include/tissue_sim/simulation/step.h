@@ -36,7 +36,7 @@ struct OrganWorkspace {
   std::vector<Vector3> gradient;
   OrganState last_good;
 
-  std::vector<Contact> contacts;          ///< of the step, one a place that was pressed in any of its substeps
+  std::vector<OrganContact> contacts;          ///< of the step, one a place that was pressed in any of its substeps
   std::vector<int> contact_of;            ///< per place, into contacts, where contact_step is the current one
   std::vector<std::uint64_t> contact_step;
 };

@@ -34,7 +34,7 @@ struct StepReport {
   bool state_due = false;       ///< state_period has passed since the last state that was due
   bool recovered = false;       ///< the health check put the last good state back
   int substeps = 0;
-  std::vector<Contact> contacts;
+  std::vector<OrganContact> contacts;
   std::vector<Wrench> wrenches;  ///< one an instrument
   std::vector<Pose> poses;       ///< one an instrument, at `stamp`; meaningful where `placed`
   std::vector<char> placed;      ///< one an instrument: it has been given a pose
