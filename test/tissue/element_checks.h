@@ -19,7 +19,7 @@ template <class Kind>
 std::vector<Vector3> forces_of(const Kind& element, const std::vector<Vector3>& positions,
                                const std::vector<Vector3>& velocities) {
   std::vector<Vector3> forces(positions.size(), Vector3::Zero());
-  add_forces(element, positions, velocities, forces);
+  add_forces(element, {std::vector<double>(positions.size(), 0.0), 0.0}, positions, velocities, forces);
   return forces;
 }
 

@@ -74,9 +74,9 @@ struct Motion {
   double advance(double dt) {
     std::fill(forces.begin(), forces.end(), Vector3::Zero());
     double energy = 0.0;
-    for (const DistanceElement& e : shape.distances) energy += add_forces(e, x, v, forces);
-    for (const AreaElement& e : shape.areas) energy += add_forces(e, x, v, forces);
-    for (const VolumeElement& e : shape.flaps) energy += add_forces(e, x, v, forces);
+    for (const DistanceElement& e : shape.distances) energy += add_forces(e, {shape.inverse_mass, 1e300}, x, v, forces);
+    for (const AreaElement& e : shape.areas) energy += add_forces(e, {shape.inverse_mass, 1e300}, x, v, forces);
+    for (const VolumeElement& e : shape.flaps) energy += add_forces(e, {shape.inverse_mass, 1e300}, x, v, forces);
     const double c = shape.enclosed.evaluate(x, shape.triangles, gradient);
     energy += 0.5 * shape.enclosed.stiffness * c * c;
     double rate = 0.0;
