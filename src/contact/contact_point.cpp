@@ -73,12 +73,9 @@ void add_edge_contacts(const OrganSurface& organ, const InstrumentSurface& instr
                        const Detection& detection, std::vector<ContactPoint>& points) {
   for (const CrossedEdge& crossed : detection.crossed_edges) {
     const auto& [first, last] = organ.topology.edges[crossed.edge];
-    if (detection.side[first] != Side::outside || detection.side[last] != Side::outside) continue;
-    for (int i = crossed.first; i + 1 < crossed.first + crossed.count; i += 2) {
-      const double t = 0.5 * (detection.crossings[i].t + detection.crossings[i + 1].t);
-      const Vector3 middle = detection.local[first] + t * (detection.local[last] - detection.local[first]);
-      const ClosestFeature closest = closest_feature(instrument, middle);
-      if (!(closest.depth > 0.0)) continue;
+    const auto add_inside = [&](double t, const Vector3& place) {
+      const ClosestFeature closest = closest_feature(instrument, place);
+      if (!(closest.depth > 0.0)) return;
       const int triangle = organ.topology.edge_triangles[crossed.edge][0];
       Vector3 weights = Vector3::Zero();
       for (int corner = 0; corner < 3; ++corner) {
@@ -87,6 +84,22 @@ void add_edge_contacts(const OrganSurface& organ, const InstrumentSurface& instr
       }
       points.push_back(contact_at(organ, piece, triangle, weights, pose.apply(closest.point),
                                   pose.orientation * closest.direction));
+    };
+
+    const Vector3& p = detection.local[first];
+    const Vector3& q = detection.local[last];
+    const bool first_inside = detection.side[first] == Side::inside;
+    const bool last_inside = detection.side[last] == Side::inside;
+    if (first_inside != last_inside) {
+      const double t = first_inside ? 0.5 * detection.crossings[crossed.first].t
+                                    : 0.5 * (1.0 + detection.crossings[crossed.first + crossed.count - 1].t);
+      const ClosestFeature pushed = closest_feature(instrument, first_inside ? p : q);
+      add_inside(t, first_inside ? Vector3(pushed.point + t * (q - pushed.point)) : Vector3(p + t * (pushed.point - p)));
+    } else if (!first_inside) {
+      for (int i = crossed.first; i + 1 < crossed.first + crossed.count; i += 2) {
+        const double t = 0.5 * (detection.crossings[i].t + detection.crossings[i + 1].t);
+        add_inside(t, p + t * (q - p));
+      }
     }
   }
 }

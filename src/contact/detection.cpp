@@ -42,7 +42,6 @@ void gather_candidates(const OrganSurface& organ, const InstrumentSurface& instr
       }
     }
   });
-  std::sort(d.candidate_edges.begin(), d.candidate_edges.end());
 }
 
 /// Tests one organ edge against the instrument's tree and labels its ends by the first and the last crossing.
@@ -69,7 +68,6 @@ void cross_edge(const OrganSurface& organ, const InstrumentSurface& instrument, 
   std::sort(d.crossings.begin() + begin, d.crossings.end(), [](const Crossing& a, const Crossing& b) {
     return a.t < b.t || (a.t == b.t && a.triangle < b.triangle);
   });
-  d.crossed_edge_of[edge] = static_cast<int>(d.crossed_edges.size());
   d.crossed_edges.push_back({edge, begin, count});
 
   bool alternating = true;
@@ -174,6 +172,11 @@ void detect(const OrganSurface& organ, const InstrumentSurface& instrument, cons
 
   gather_candidates(organ, instrument, pose, d);
   for (const int edge : d.candidate_edges) cross_edge(organ, instrument, edge, d);
+  std::sort(d.crossed_edges.begin(), d.crossed_edges.end(),
+            [](const CrossedEdge& a, const CrossedEdge& b) { return a.edge < b.edge; });
+  for (std::size_t i = 0; i < d.crossed_edges.size(); ++i) {
+    d.crossed_edge_of[d.crossed_edges[i].edge] = static_cast<int>(i);
+  }
   for (const int vertex : d.candidates) {
     if (side_of(d, vertex) == Side::contradicted) decide_by_closest_feature(instrument, d, vertex);
   }

@@ -29,7 +29,8 @@ void add_vertex_contacts(const OrganSurface& organ, const InstrumentSurface& ins
                          const Penetration& penetration, Detection& detection, std::vector<int>& touching,
                          std::vector<ContactPoint>& points);
 
-/// Edges that go in and come out again between two vertices outside, at the middle of what is inside.
+/// Edges that go in and come out again between two vertices outside, at the middle of what is inside; and edges with one end inside
+/// that still run through the instrument once that end is on its surface, as they do along a thin shaft.
 void add_edge_contacts(const OrganSurface& organ, const InstrumentSurface& instrument, int piece, const Pose& pose,
                        const Detection& detection, std::vector<ContactPoint>& points);
 
