@@ -49,11 +49,11 @@ double integrate(const OrganModel& organ, const Vector3& gravity, double dt, con
   double fastest = 0.0;
   for (std::size_t v = 0; v < forces.size(); ++v) {
     if (rest.attached[v]) continue;
-    const Vector3 change = dt * (rest.inverse_mass[v] * forces[v] + gravity);
     if (state.held[v]) {
-      state.velocities[v] = change;
+      state.velocities[v].setZero();
       continue;
     }
+    const Vector3 change = dt * (rest.inverse_mass[v] * forces[v] + gravity);
     state.velocities[v] = slowed * (state.velocities[v] + change);
     state.positions[v] += dt * state.velocities[v];
     fastest = std::max(fastest, state.velocities[v].squaredNorm());

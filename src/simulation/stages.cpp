@@ -59,6 +59,15 @@ std::size_t place_of(const ContactPoint& point, std::size_t vertices) {
   return vertices + static_cast<std::size_t>(point.triangle);
 }
 
+/// A held vertex gains no velocity that the response could stop: what its elements push with, the instrument bears.
+void bear_held(const OrganState& state, double dt, ContactPoint& point) {
+  for (int i = 0; i < 3; ++i) {
+    const int vertex = point.vertices[i];
+    if (!state.held[vertex]) continue;
+    point.impulse += point.weights[i] * dt * std::max(0.0, -point.direction.dot(state.forces[vertex]));
+  }
+}
+
 void record_contact(StepContext& context, const ContactPoint& point) {
   OrganWorkspace& work = context.work();
   const std::size_t vertices = context.state.positions.size();
@@ -116,7 +125,6 @@ Workspace build_workspace(const World& world) {
       prepare(work.detections[p], surface);
       prepare(work.penetrations[p], surface);
     }
-    work.forces.assign(rest.positions.size(), Vector3::Zero());
     work.gradient.assign(rest.positions.size(), Vector3::Zero());
     const std::size_t places = world.pieces.size() * (rest.positions.size() + rest.triangles.size());
     work.contact_of.assign(places, 0);
@@ -146,6 +154,7 @@ void begin_report(const World& world, const Motion& motion, StepReport& report) 
 int count_substeps(StepContext& context) {
   OrganWorkspace& work = context.work();
   work.contacts.clear();
+  context.slept = context.state.asleep;
   for (std::size_t i = 0; i < context.motion.instruments.size(); ++i) {
     context.workspace.now[i] = context.motion.instruments[i].from;
   }
@@ -281,7 +290,8 @@ void respond(StepContext& context) {
   if (rest.elastic()) stop_at_instrument(work.points, rest.inverse_mass, context.state.velocities);
   work.travel += way;
   for (Clearance& clearance : context.state.clearances) clearance.shift += way;
-  for (const ContactPoint& point : work.points) {
+  for (ContactPoint& point : work.points) {
+    bear_held(context.state, context.dt, point);
     record_contact(context, point);
     push_on_instrument(context, point);
   }
@@ -292,8 +302,8 @@ void deform(StepContext& context) {
   if (!model.rest.elastic() || context.state.asleep) return;
   const Lap lap(context.report.profile.deformation);
   OrganWorkspace& work = context.work();
-  element_forces(model.rest, context.state, work.forces, work.gradient);
-  const double speed = integrate(model, context.world.gravity, context.dt, work.forces, context.state);
+  element_forces(model.rest, context.state, context.state.forces, work.gradient);
+  const double speed = integrate(model, context.world.gravity, context.dt, context.state.forces, context.state);
   work.travel += context.dt * speed;
   for (Clearance& clearance : context.state.clearances) clearance.shift += context.dt * speed;
   if (work.points.empty() && speed < sleep_speed) {
@@ -305,7 +315,8 @@ void deform(StepContext& context) {
 void check_health(StepContext& context) {
   const Lap lap(context.report.profile.health);
   OrganWorkspace& work = context.work();
-  if (context.state.asleep && work.contacts.empty()) return;
+  // What fell asleep in this step is looked at: a position that is not a number has no speed and touches nothing.
+  if (context.slept && context.state.asleep && work.contacts.empty()) return;
   if (healthy(context.model().rest, context.state)) {
     work.last_good = context.state;
     return;

@@ -28,6 +28,7 @@ OrganState rest_state(const World& world, int organ) {
   OrganState state;
   state.positions = model.rest.positions;
   state.velocities.assign(vertices, Vector3::Zero());
+  state.forces.assign(vertices, Vector3::Zero());
   state.depths.assign(vertices, 0.0);
   state.held.assign(vertices, 0);
   state.colliding.resize(world.pieces.size());

@@ -19,6 +19,7 @@ struct Segment {
   std::int64_t end = 0;
   std::int64_t steps = 0;
   std::int64_t done = 0;
+  bool ends_on_pose = false;
   std::vector<Pose> from;  ///< one an instrument
   std::vector<Pose> to;
 
@@ -45,7 +46,7 @@ struct Timeline::Impl {
   PoseVerdict take(int instrument, StampedPose pose);
   void start_run(int instrument, const StampedPose& first);
   bool next_segment();
-  void begin_segment(std::int64_t end);
+  void begin_segment(std::int64_t end, bool ends_on_pose);
   void make_step();
   void reset_organ(int organ);
 
@@ -106,7 +107,7 @@ void Timeline::Impl::start_run(int instrument, const StampedPose& first) {
   tracks[instrument].newest = first.stamp;
   now = std::max<std::int64_t>(first.stamp - longest_step, 1);
   last_state = 0;
-  begin_segment(std::max(first.stamp, now + 1));
+  begin_segment(std::max(first.stamp, now + 1), true);
 }
 
 /// The next stamp to go to is the earliest that lies ahead, once every instrument has said where it will be or is too late to wait for.
@@ -122,11 +123,12 @@ bool Timeline::Impl::next_segment() {
   for (const PoseTrack& track : tracks) {
     if (track.placed && track.ahead.empty() && newest - track.newest < options.pose_timeout) return false;
   }
-  begin_segment(earliest);
+  begin_segment(earliest, true);
   return true;
 }
 
-void Timeline::Impl::begin_segment(std::int64_t end) {
+void Timeline::Impl::begin_segment(std::int64_t end, bool ends_on_pose) {
+  segment.ends_on_pose = ends_on_pose;
   segment.begin = now;
   segment.end = end;
   segment.steps = (end - now + longest_step - 1) / longest_step;
@@ -164,15 +166,13 @@ void Timeline::Impl::make_step() {
   tissue_sim::step(world, motion, state, workspace, report);
   if (report.recovered) ++counters.recoveries;
 
-  report.pose_reached = false;
+  report.pose_reached = segment.over() && segment.ends_on_pose;
   for (std::size_t i = 0; segment.over() && i < tracks.size(); ++i) {
     PoseTrack& track = tracks[i];
-    report.pose_reached = report.pose_reached || track.newest == stamp;
     if (track.ahead.empty() || track.ahead.front().stamp > stamp) continue;
     track.placed = true;
     track.pose = track.ahead.front().pose;
     track.ahead.pop_front();
-    report.pose_reached = true;
   }
 
   // Tied to a pose wherever poses come often enough; between poses that are far apart, where another state still fits before the next.
@@ -214,7 +214,7 @@ bool Timeline::step() {
 bool Timeline::step_holding(std::int64_t until) {
   if (step()) return true;
   if (impl_->now == 0 || impl_->now + impl_->longest_step > until) return false;
-  impl_->begin_segment(impl_->now + impl_->longest_step);
+  impl_->begin_segment(impl_->now + impl_->longest_step, false);
   impl_->make_step();
   return true;
 }

@@ -11,8 +11,7 @@ int substeps_for(const RestShape& rest, double duration);
 double element_forces(const RestShape& rest, const OrganState& state, std::vector<Vector3>& forces,
                       std::vector<Vector3>& gradient);
 
-/// One explicit (symplectic) substep of dt (s): v += dt (f/m + g), slowed by the drag, then x += dt v. Attached vertices stay. Held
-/// vertices stay too, and keep dt f/m as velocity, so that a contact can tell the force that it bears.
+/// One explicit (symplectic) substep of dt (s): v += dt (f/m + g), slowed by the drag, then x += dt v. Attached and held vertices stay.
 /// Returns the largest speed of a vertex that moved, m/s.
 double integrate(const OrganModel& organ, const Vector3& gravity, double dt, const std::vector<Vector3>& forces,
                  OrganState& state);

@@ -12,7 +12,8 @@ struct StepContext {
   OrganState& state;
   Workspace& workspace;
   StepReport& report;
-  double dt = 0.0;  ///< s, of the substep
+  double dt = 0.0;     ///< s, of the substep
+  bool slept = false;  ///< the organ was asleep when the step began
 
   const OrganModel& model() const { return world.organs[organ]; }
   OrganWorkspace& work() { return workspace.organs[organ]; }

@@ -13,6 +13,7 @@ namespace tissue_sim {
 struct OrganState {
   std::vector<Vector3> positions;               ///< m, scene frame
   std::vector<Vector3> velocities;              ///< m/s
+  std::vector<Vector3> forces;                  ///< N, of the elements in the last substep
   std::vector<double> depths;                   ///< m, 0 where no instrument presses
   std::vector<char> held;                       ///< 1: moved by an instrument and left there (restoration off)
   std::vector<std::vector<char>> colliding;     ///< per piece, one a vertex: the paper's memory; empty for the flood

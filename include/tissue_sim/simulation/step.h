@@ -32,7 +32,6 @@ struct OrganWorkspace {
   std::vector<Penetration> penetrations;  ///< per piece
   std::vector<char> near;                 ///< per piece: its box and the organ's overlap in this substep
   std::vector<ContactPoint> points;
-  std::vector<Vector3> forces;
   std::vector<Vector3> gradient;
   OrganState last_good;
 
