@@ -8,8 +8,8 @@ namespace tissue_sim {
 
 namespace {
 
-/// Of the triangle's longest side: how far a poke pushes a triangle in one pass. After an instrument has appeared inside an organ the
-/// nearest surface is far, and pulled over at once it folds.
+/// Of the triangle's longest side: how far a poke pushes a triangle in one pass. After an instrument has appeared
+/// inside an organ the nearest surface is far, and pulled over at once it folds.
 constexpr double longest_push = 0.5;
 
 /// Of the same: the motion after which a vertex that was no poke is looked at again.
@@ -24,8 +24,8 @@ double longest_side(const OrganSurface& organ, int triangle) {
 }
 
 /// A point of the organ pushed along `direction` (scene frame) until it reaches `place` (scene frame).
-ContactPoint contact_at(const OrganSurface& organ, int piece, int triangle, const Vector3& weights, const Vector3& place,
-                        const Vector3& direction) {
+ContactPoint contact_at(const OrganSurface& organ, int piece, int triangle, const Vector3& weights,
+                        const Vector3& place, const Vector3& direction) {
   ContactPoint point;
   point.piece = piece;
   point.triangle = triangle;
@@ -61,7 +61,8 @@ void add_vertex_contacts(const OrganSurface& organ, const InstrumentSurface& ins
     if (std::binary_search(detection.colliding.begin(), detection.colliding.end(), vertex)) continue;
     const ClosestFeature closest = closest_feature(instrument, local_position(detection, organ, pose, vertex));
     if (!(std::abs(closest.depth) < contact_margin)) continue;
-    points.push_back(vertex_contact(organ, piece, vertex, pose.apply(closest.point), pose.orientation * closest.direction));
+    points.push_back(
+        vertex_contact(organ, piece, vertex, pose.apply(closest.point), pose.orientation * closest.direction));
     detection.stack.push_back(vertex);
   }
   touching.resize(detection.colliding.size() + detection.stack.size());
@@ -82,8 +83,8 @@ void add_edge_contacts(const OrganSurface& organ, const InstrumentSurface& instr
         if (organ.triangles[triangle][corner] == first) weights[corner] = 1.0 - t;
         if (organ.triangles[triangle][corner] == last) weights[corner] = t;
       }
-      points.push_back(contact_at(organ, piece, triangle, weights, pose.apply(closest.point),
-                                  pose.orientation * closest.direction));
+      points.push_back(
+          contact_at(organ, piece, triangle, weights, pose.apply(closest.point), pose.orientation * closest.direction));
     };
 
     const Vector3& p = detection.local[first];
@@ -94,7 +95,8 @@ void add_edge_contacts(const OrganSurface& organ, const InstrumentSurface& instr
       const double t = first_inside ? 0.5 * detection.crossings[crossed.first].t
                                     : 0.5 * (1.0 + detection.crossings[crossed.first + crossed.count - 1].t);
       const ClosestFeature pushed = closest_feature(instrument, first_inside ? p : q);
-      add_inside(t, first_inside ? Vector3(pushed.point + t * (q - pushed.point)) : Vector3(p + t * (pushed.point - p)));
+      add_inside(t,
+                 first_inside ? Vector3(pushed.point + t * (q - pushed.point)) : Vector3(p + t * (pushed.point - p)));
     } else if (!first_inside) {
       for (int i = crossed.first; i + 1 < crossed.first + crossed.count; i += 2) {
         const double t = 0.5 * (detection.crossings[i].t + detection.crossings[i + 1].t);
@@ -111,9 +113,8 @@ void add_poke_contacts(const OrganSurface& organ, const InstrumentSurface& instr
     if (travelled < clearance.free_until[u]) continue;
 
     const Vector3 tip = pose.apply(instrument.vertices[u]);
-    const ClosestOnMesh closest =
-        closest_on_mesh(organ.positions, organ.triangles, organ.tree, tip, std::numeric_limits<double>::max(),
-                        clearance.nearest[u]);
+    const ClosestOnMesh closest = closest_on_mesh(organ.positions, organ.triangles, organ.tree, tip,
+                                                  std::numeric_limits<double>::max(), clearance.nearest[u]);
     if (closest.triangle < 0) continue;  // a position that is not a number is near nothing
     const double distance = std::sqrt(closest.squared_distance);
     clearance.nearest[u] = closest.triangle;
@@ -125,7 +126,7 @@ void add_poke_contacts(const OrganSurface& organ, const InstrumentSurface& instr
     if (!below_surface) clearance.first_touch[u] = travelled + distance;
     if (!below_surface && !(distance < contact_margin)) continue;
 
-    const Vector3 direction = distance < 1e-9   ? Vector3(-outward.stableNormalized())
+    const Vector3 direction = distance < 1e-9 ? Vector3(-outward.stableNormalized())
                               : below_surface ? Vector3(above / distance)
                                               : Vector3(-above / distance);
     const double side = longest_side(organ, closest.triangle);

@@ -22,6 +22,9 @@ constexpr double sleep_speed = 1e-7;
 /// Of a mean edge: how much the boxes of an organ's tree are grown, so that it is refitted after that much motion only.
 constexpr double slack_fraction = 0.2;
 
+/// Contacts of a step that are made room for from the start: more than a tool makes, so that a warm step allocates nothing.
+constexpr std::size_t usual_contacts = 256;
+
 /// Adds the time from here to the end of the scope to a stage of the profile.
 class Lap {
  public:
@@ -128,6 +131,7 @@ Workspace build_workspace(const World& world) {
     work.gradient.assign(rest.positions.size(), Vector3::Zero());
     const std::size_t places = world.pieces.size() * (rest.positions.size() + rest.triangles.size());
     work.contact_of.assign(places, 0);
+    work.contacts.reserve(usual_contacts);
     work.contact_step.assign(places, 0);
     work.last_good = rest_state(world, static_cast<int>(organ));
     forget(work);
@@ -142,6 +146,7 @@ void begin_report(const World& world, const Motion& motion, StepReport& report) 
   report.recovered = false;
   report.substeps = 0;
   report.contacts.clear();
+  report.contacts.reserve(usual_contacts);
   report.wrenches.assign(static_cast<std::size_t>(world.instruments), Wrench());
   report.poses.resize(static_cast<std::size_t>(world.instruments));
   report.placed.resize(static_cast<std::size_t>(world.instruments));

@@ -1,0 +1,82 @@
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <new>
+
+#include "simulation/test_scenes.h"
+
+namespace {
+std::size_t allocations = 0;
+
+void* counted(std::size_t size) {
+  ++allocations;
+  if (void* memory = std::malloc(size > 0 ? size : 1)) return memory;
+  throw std::bad_alloc();
+}
+}  // namespace
+
+void* operator new(std::size_t size) {
+  return counted(size);
+}
+void* operator new[](std::size_t size) {
+  return counted(size);
+}
+void operator delete(void* memory) noexcept {
+  std::free(memory);
+}
+void operator delete[](void* memory) noexcept {
+  std::free(memory);
+}
+void operator delete(void* memory, std::size_t) noexcept {
+  std::free(memory);
+}
+void operator delete[](void* memory, std::size_t) noexcept {
+  std::free(memory);
+}
+
+namespace tissue_sim {
+namespace {
+
+/// 100 ms in, 100 ms out, the same way each time.
+void press_once(Simulation& simulation) {
+  const Pose in = {{0.042, 0.003, 0.002}, Eigen::Quaterniond::Identity()};
+  const Pose out = {{0.062, 0.003, 0.002}, Eigen::Quaterniond::Identity()};
+  simulation.slide_to(in, 100);
+  simulation.slide_to(out, 100);
+}
+
+std::size_t allocations_once_warm(DepthScheme depth, CollidingSet set) {
+  Organ organ = wall_sphere(16);
+  organ.depth = depth;
+  organ.colliding_set = set;
+  Simulation simulation(scene_of(organ, {ball(0.01)}));
+  simulation.start_at({{0.062, 0.003, 0.002}, Eigen::Quaterniond::Identity()});
+  for (int i = 0; i < 2; ++i) press_once(simulation);
+  const Motion away = {0.001, {{true, simulation.poses[0], simulation.poses[0]}}};
+  for (int i = 0; i < 100; ++i) step(simulation.world, away, simulation.state, simulation.workspace, simulation.report);
+
+  Motion motion = away;
+  int contacts = 0;
+  const std::size_t before = allocations;
+  for (int i = 1; i <= 200; ++i) {
+    motion.instruments[0].from = motion.instruments[0].to;
+    motion.instruments[0].to.position.x() = 0.062 - 0.020 * std::min(i, 200 - i) / 100.0;
+    ++simulation.report.step;
+    step(simulation.world, motion, simulation.state, simulation.workspace, simulation.report);
+    contacts += static_cast<int>(simulation.report.contacts.size());
+  }
+  const std::size_t after = allocations;
+  EXPECT_GT(contacts, 50);
+  return after - before;
+}
+
+TEST(Allocation, NoneInAWarmStep) {
+  EXPECT_EQ(allocations_once_warm(DepthScheme::exact, CollidingSet::flood), 0u);
+}
+
+TEST(Allocation, NoneInAWarmStepOfThePapersScheme) {
+  EXPECT_EQ(allocations_once_warm(DepthScheme::paper, CollidingSet::paper), 0u);
+}
+
+}  // namespace
+}  // namespace tissue_sim
