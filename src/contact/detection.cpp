@@ -8,8 +8,9 @@ namespace tissue_sim {
 
 namespace {
 
-/// m. Organ vertices are looked at this far from where they are, always the same way: a vertex that a response has put exactly
-/// on a triangle, or grids that fall together, then lie on one side for every triangle. Far below any length that matters.
+/// m. Organ vertices are looked at this far from where they are, always the same way: a vertex that a response has put
+/// exactly on a triangle, or grids that fall together, then lie on one side for every triangle. Far below any length
+/// that matters.
 const Vector3 tie_break(0.61e-9, 0.37e-9, 0.70e-9);
 
 Side& side_of(Detection& d, int vertex) {
@@ -65,24 +66,30 @@ void cross_edge(const OrganSurface& organ, const InstrumentSurface& instrument, 
   const int count = static_cast<int>(d.crossings.size()) - begin;
   if (count == 0) return;
 
-  std::sort(d.crossings.begin() + begin, d.crossings.end(), [](const Crossing& a, const Crossing& b) {
-    return a.t < b.t || (a.t == b.t && a.triangle < b.triangle);
-  });
+  std::sort(d.crossings.begin() + begin, d.crossings.end(),
+            [](const Crossing& a, const Crossing& b) { return a.t < b.t || (a.t == b.t && a.triangle < b.triangle); });
   d.crossed_edges.push_back({edge, begin, count});
 
   bool alternating = true;
   for (int i = begin + 1; i < begin + count; ++i) {
     alternating = alternating && d.crossings[i].direction == -d.crossings[i - 1].direction;
   }
-  set_side(d, first, !alternating ? Side::contradicted : d.crossings[begin].direction > 0 ? Side::inside : Side::outside);
-  set_side(d, last, !alternating ? Side::contradicted : d.crossings[begin + count - 1].direction < 0 ? Side::inside : Side::outside);
+  set_side(d, first,
+           !alternating                       ? Side::contradicted
+           : d.crossings[begin].direction > 0 ? Side::inside
+                                              : Side::outside);
+  set_side(d, last,
+           !alternating                                   ? Side::contradicted
+           : d.crossings[begin + count - 1].direction < 0 ? Side::inside
+                                                          : Side::outside);
 }
 
 Side decide_by_closest_feature(const InstrumentSurface& instrument, Detection& d, int vertex) {
   ++d.fallbacks;
   Side& side = side_of(d, vertex);
-  side = instrument.bounds.contains(d.local[vertex]) && closest_feature(instrument, d.local[vertex]).depth > 0.0 ? Side::inside
-                                                                                                          : Side::outside;
+  side = instrument.bounds.contains(d.local[vertex]) && closest_feature(instrument, d.local[vertex]).depth > 0.0
+             ? Side::inside
+             : Side::outside;
   return side;
 }
 

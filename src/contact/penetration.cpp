@@ -35,7 +35,8 @@ void penetrate_border(const OrganSurface& organ, const InstrumentSurface& instru
       if (detection.edge_stamp[*edge] != detection.stamp || detection.crossed_edge_of[*edge] < 0) continue;
       const CrossedEdge& crossed = detection.crossed_edges[detection.crossed_edge_of[*edge]];
       const bool leaves_from_start = organ.topology.edges[*edge][0] == vertex;
-      const Crossing& crossing = detection.crossings[leaves_from_start ? crossed.first : crossed.first + crossed.count - 1];
+      const Crossing& crossing =
+          detection.crossings[leaves_from_start ? crossed.first : crossed.first + crossed.count - 1];
       const Vector3& normal = instrument.normals[crossing.triangle];
       const double weight = inverse_square_weight(crossing.point, p);
       weight_sum += weight;

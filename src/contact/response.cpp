@@ -10,8 +10,9 @@ namespace {
 /// Points that share vertices disturb each other; this many rounds leave less than the contact margin.
 constexpr int rounds = 8;
 
-/// sum w_i^2 / m_i: how easily the point moves. 0 where all its vertices are attached. Bounded from below so that no vertex goes more
-/// than twice as far as the point is asked to: one free corner with a small weight beside two attached ones would be thrown.
+/// sum w_i^2 / m_i: how easily the point moves. 0 where all its vertices are attached. Bounded from below so that no
+/// vertex goes more than twice as far as the point is asked to: one free corner with a small weight beside two attached
+/// ones would be thrown.
 struct Mobility {
   double ease = 0.0;
   bool bounded = false;

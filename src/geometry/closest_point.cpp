@@ -1,9 +1,8 @@
 #include "tissue_sim/geometry/closest_point.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-
-#include <Eigen/Geometry>
 
 namespace tissue_sim {
 
@@ -26,7 +25,9 @@ ClosestOnTriangle closest_on_rim(const Vector3& p, const std::array<const Vector
   return closest;
 }
 
-double angle_between(const Vector3& u, const Vector3& v) { return std::atan2(u.cross(v).norm(), u.dot(v)); }
+double angle_between(const Vector3& u, const Vector3& v) {
+  return std::atan2(u.cross(v).norm(), u.dot(v));
+}
 
 }  // namespace
 
@@ -76,9 +77,7 @@ ClosestOnMesh closest_on_mesh(const std::vector<Vector3>& vertices, const std::v
 
 Vector3 pseudonormal(const std::vector<Vector3>& vertices, const std::vector<Triangle>& triangles,
                      const MeshTopology& topology, int triangle, Feature feature) {
-  const auto corner = [&](int t, int i) -> const Vector3& {
-    return vertices[triangles[t][i % 3]];
-  };
+  const auto corner = [&](int t, int i) -> const Vector3& { return vertices[triangles[t][i % 3]]; };
   const auto face_normal = [&](int t) { return area_normal(corner(t, 0), corner(t, 1), corner(t, 2)); };
 
   if (feature == Feature::face) return face_normal(triangle);

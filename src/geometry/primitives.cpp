@@ -20,7 +20,8 @@ TriangleMesh make_sphere(double radius, int n) {
   mesh.vertices.emplace_back(0.0, 0.0, radius);
   for (int stack = 1; stack < n; ++stack) {
     const double polar = pi * stack / n;
-    for (int i = 0; i < n; ++i) mesh.vertices.push_back(on_circle(i, n, radius * std::sin(polar), radius * std::cos(polar)));
+    for (int i = 0; i < n; ++i)
+      mesh.vertices.push_back(on_circle(i, n, radius * std::sin(polar), radius * std::cos(polar)));
   }
   mesh.vertices.emplace_back(0.0, 0.0, -radius);
 

@@ -7,8 +7,9 @@ namespace tissue_sim {
 
 namespace {
 
-/// How much stiffer than the stiffest at rest an element may become, as squared frequency. 4 would do for one mode at the safety of 0.4, but
-/// around a vertex many stretch at once: 4 let a sphere's poles run away when it was pressed flat, 2 only just did not.
+/// How much stiffer than the stiffest at rest an element may become, as squared frequency. 4 would do for one mode at
+/// the safety of 0.4, but around a vertex many stretch at once: 4 let a sphere's poles run away when it was pressed
+/// flat, 2 only just did not.
 constexpr double covered_stiffening = 1.5;
 
 }  // namespace

@@ -5,19 +5,25 @@
 namespace tissue_sim {
 
 namespace {
-constexpr double farthest = 1000.0;        ///< m from the scene's origin
+constexpr double farthest = 1000.0;  ///< m from the scene's origin
 constexpr double shortest_quaternion = 1e-6;
-constexpr double off_unit_length = 1e-3;   ///< of a quaternion: rounding and drift stay well below
+constexpr double off_unit_length = 1e-3;  ///< of a quaternion: rounding and drift stay well below
 }  // namespace
 
 const char* to_string(PoseVerdict verdict) {
   switch (verdict) {
-    case PoseVerdict::used: return "used";
-    case PoseVerdict::zero_stamp: return "zero stamp";
-    case PoseVerdict::non_finite: return "non-finite";
-    case PoseVerdict::zero_quaternion: return "zero quaternion";
-    case PoseVerdict::stale: return "stale";
-    case PoseVerdict::new_run: return "new run";
+    case PoseVerdict::used:
+      return "used";
+    case PoseVerdict::zero_stamp:
+      return "zero stamp";
+    case PoseVerdict::non_finite:
+      return "non-finite";
+    case PoseVerdict::zero_quaternion:
+      return "zero quaternion";
+    case PoseVerdict::stale:
+      return "stale";
+    case PoseVerdict::new_run:
+      return "new run";
   }
   return "";
 }

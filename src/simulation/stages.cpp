@@ -16,13 +16,15 @@ namespace {
 /// More cuts than this for one step is a jump, not a motion (60 m/s with 1 ms steps on 2 mm edges): it is not swept.
 constexpr int most_motion_substeps = 300;
 
-/// m/s. An untouched organ whose fastest vertex is slower goes to sleep: what is left to move is far below a micrometre.
+/// m/s. An untouched organ whose fastest vertex is slower goes to sleep: what is left to move is far below a
+/// micrometre.
 constexpr double sleep_speed = 1e-7;
 
 /// Of a mean edge: how much the boxes of an organ's tree are grown, so that it is refitted after that much motion only.
 constexpr double slack_fraction = 0.2;
 
-/// Contacts of a step that are made room for from the start: more than a tool makes, so that a warm step allocates nothing.
+/// Contacts of a step that are made room for from the start: more than a tool makes, so that a warm step allocates
+/// nothing.
 constexpr std::size_t usual_contacts = 256;
 
 /// Adds the time from here to the end of the scope to a stage of the profile.
@@ -38,7 +40,9 @@ class Lap {
   std::chrono::steady_clock::time_point start_;
 };
 
-double angle_between(const Pose& a, const Pose& b) { return a.orientation.angularDistance(b.orientation); }
+double angle_between(const Pose& a, const Pose& b) {
+  return a.orientation.angularDistance(b.orientation);
+}
 
 void fit_tree(const OrganModel& model, const OrganState& state, OrganWorkspace& work) {
   for (std::size_t t = 0; t < work.boxes.size(); ++t) {
@@ -54,7 +58,8 @@ Vector3 velocity_of(const Pose& before, const Pose& now, const Vector3& point, d
   return (point - before.apply(now.apply_inverse(point))) / dt;
 }
 
-/// The same place of the organ has the same number in every substep of a step: its vertex, or its triangle behind all vertices.
+/// The same place of the organ has the same number in every substep of a step: its vertex, or its triangle behind all
+/// vertices.
 std::size_t place_of(const ContactPoint& point, std::size_t vertices) {
   for (int i = 0; i < 3; ++i) {
     if (point.weights[i] >= 1.0) return static_cast<std::size_t>(point.vertices[i]);
@@ -139,7 +144,9 @@ Workspace build_workspace(const World& world) {
   return workspace;
 }
 
-void forget(OrganWorkspace& work) { work.travel = 1e300; }
+void forget(OrganWorkspace& work) {
+  work.travel = 1e300;
+}
 
 void begin_report(const World& world, const Motion& motion, StepReport& report) {
   report.profile = StepProfile();

@@ -11,7 +11,9 @@ namespace {
 
 constexpr double nanosecond = 1e-9;
 
-std::int64_t in_nanoseconds(double seconds) { return static_cast<std::int64_t>(seconds / nanosecond + 0.5); }
+std::int64_t in_nanoseconds(double seconds) {
+  return static_cast<std::int64_t>(seconds / nanosecond + 0.5);
+}
 
 /// The way from one stamp to the next, cut into steps that are equal to within a nanosecond.
 struct Segment {
@@ -110,7 +112,8 @@ void Timeline::Impl::start_run(int instrument, const StampedPose& first) {
   begin_segment(std::max(first.stamp, now + 1), true);
 }
 
-/// The next stamp to go to is the earliest that lies ahead, once every instrument has said where it will be or is too late to wait for.
+/// The next stamp to go to is the earliest that lies ahead, once every instrument has said where it will be or is too
+/// late to wait for.
 bool Timeline::Impl::next_segment() {
   std::int64_t earliest = 0;
   std::int64_t newest = 0;
@@ -175,7 +178,8 @@ void Timeline::Impl::make_step() {
     track.ahead.pop_front();
   }
 
-  // Tied to a pose wherever poses come often enough; between poses that are far apart, where another state still fits before the next.
+  // Tied to a pose wherever poses come often enough; between poses that are far apart, where another state still fits
+  // before the next.
   const bool period_over = last_state == 0 || stamp - last_state >= options.state_period;
   const bool fits_before_pose = segment.end - stamp >= options.state_period;
   report.state_due = period_over && (segment.over() || fits_before_pose);
@@ -196,7 +200,8 @@ void Timeline::Impl::reset_organ(int organ) {
   ++counters.resets;
 }
 
-Timeline::Timeline(const Scene& scene, const TimelineOptions& options) : impl_(std::make_unique<Impl>(scene, options)) {}
+Timeline::Timeline(const Scene& scene, const TimelineOptions& options)
+    : impl_(std::make_unique<Impl>(scene, options)) {}
 Timeline::~Timeline() = default;
 
 PoseVerdict Timeline::add_pose(int instrument, const StampedPose& pose) {
@@ -225,7 +230,9 @@ void Timeline::reset(int organ) {
   }
 }
 
-const StepReport& Timeline::report() const { return impl_->report; }
+const StepReport& Timeline::report() const {
+  return impl_->report;
+}
 
 OrganView Timeline::organ(int index) const {
   return {impl_->state.organs[index].positions, impl_->state.organs[index].depths};
@@ -247,9 +254,15 @@ OrganSummary Timeline::summary(int organ) const {
   return summary;
 }
 
-const TimelineCounters& Timeline::counters() const { return impl_->counters; }
-std::uint64_t Timeline::hash() const { return impl_->hash; }
-std::int64_t Timeline::now() const { return impl_->now; }
+const TimelineCounters& Timeline::counters() const {
+  return impl_->counters;
+}
+std::uint64_t Timeline::hash() const {
+  return impl_->hash;
+}
+std::int64_t Timeline::now() const {
+  return impl_->now;
+}
 
 double Timeline::kinetic_energy() const {
   double energy = 0.0;

@@ -10,15 +10,15 @@ namespace tissue_sim {
 
 namespace {
 
-/// An instrument moves at most this part of an organ edge between two contact passes: with 1 mm jumps on 5 mm edges the response was
-/// seen to blow up once in six.
+/// An instrument moves at most this part of an organ edge between two contact passes: with 1 mm jumps on 5 mm edges the
+/// response was seen to blow up once in six.
 constexpr double edge_fraction = 0.25;
 
 /// ... and this part of its own thickness, so that nothing is passed over and the nearest way out is the way it came.
 constexpr double thickness_fraction = 0.25;
 
-/// Of a mean organ edge: an instrument curved less sharply than this reaches at most a 24th of an edge below the surface between two
-/// vertices that it touches.
+/// Of a mean organ edge: an instrument curved less sharply than this reaches at most a 24th of an edge below the
+/// surface between two vertices that it touches.
 constexpr double sharp = 3.0;
 
 void refuse_if_too_stiff(const Scene& scene, const Organ& organ, const RestShape& rest) {
@@ -29,8 +29,9 @@ void refuse_if_too_stiff(const Scene& scene, const Organ& organ, const RestShape
   std::ostringstream line;
   line.precision(2);
   line << "organ " << organ.name << ": a step of " << scene.time_step << " s needs " << substeps << " substeps of "
-       << rest.stable_substep << " s, more than max_substeps: " << scene.max_substeps << "; time_step: " << 0.99 * time_step
-       << " or material young: " << 0.98 * softer * organ.material.young << " would do, or a higher max_substeps";
+       << rest.stable_substep << " s, more than max_substeps: " << scene.max_substeps
+       << "; time_step: " << 0.99 * time_step << " or material young: " << 0.98 * softer * organ.material.young
+       << " would do, or a higher max_substeps";
   throw SceneError(line.str());
 }
 

@@ -11,9 +11,9 @@ namespace tissue_sim {
 
 namespace {
 
-constexpr double on_surface = 1e-9;     ///< m
-constexpr double shallowest = 0.1e-3;   ///< m; the error of a depth of nothing is no fraction of it
-constexpr int path_stride = 5;          ///< of the path's steps: neighbours differ by half a millimetre only
+constexpr double on_surface = 1e-9;    ///< m
+constexpr double shallowest = 0.1e-3;  ///< m; the error of a depth of nothing is no fraction of it
+constexpr int path_stride = 5;         ///< of the path's steps: neighbours differ by half a millimetre only
 
 /// The undeformed organ, the instrument, and room for both.
 struct Pair {
@@ -29,7 +29,9 @@ struct Pair {
     prepare(detection, surface());
     prepare(penetration, surface());
   }
-  OrganSurface surface() const { return {organ.positions, organ.triangles, organ.topology, organ.component_roots, tree}; }
+  OrganSurface surface() const {
+    return {organ.positions, organ.triangles, organ.topology, organ.component_roots, tree};
+  }
 
   RestShape organ;
   InstrumentSurface instrument;

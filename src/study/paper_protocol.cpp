@@ -64,9 +64,12 @@ const std::array<PaperTest, 9> paper_tests = {{
 
 const char* to_string(Approach approach) {
   switch (approach) {
-    case Approach::contact_only: return "contact_only";
-    case Approach::without_restoration: return "without_restoration";
-    case Approach::with_restoration: return "with_restoration";
+    case Approach::contact_only:
+      return "contact_only";
+    case Approach::without_restoration:
+      return "without_restoration";
+    case Approach::with_restoration:
+      return "with_restoration";
   }
   return "";
 }

@@ -1,15 +1,14 @@
 #include "tissue_sim/tissue/enclosed_volume.h"
 
-#include <algorithm>
-
 #include <Eigen/Geometry>
+#include <algorithm>
 
 namespace tissue_sim {
 
 double EnclosedVolume::evaluate(const std::vector<Vector3>& positions, const std::vector<Triangle>& triangles,
                                 std::vector<Vector3>& gradient) const {
-  // Six times the volume is the sum of p_a . (p_b x p_c). Taken from a vertex of the surface, not from the origin: far from the
-  // origin the terms would cancel to nothing.
+  // Six times the volume is the sum of p_a . (p_b x p_c). Taken from a vertex of the surface, not from the origin: far
+  // from the origin the terms would cancel to nothing.
   const Vector3 origin = positions.front();
   std::fill(gradient.begin(), gradient.end(), Vector3::Zero());
   const double sixth = 1.0 / (6.0 * rest);

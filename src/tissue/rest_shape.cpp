@@ -11,8 +11,8 @@ namespace tissue_sim {
 
 namespace {
 
-// Floors for measures that are near zero at rest, as fractions of the mean over the organ. Without the last, Eq. 8 divides by zero on
-// every flat pair of triangles.
+// Floors for measures that are near zero at rest, as fractions of the mean over the organ. Without the last, Eq. 8
+// divides by zero on every flat pair of triangles.
 constexpr double shortest_length = 0.5;
 constexpr double smallest_area = 0.25;
 constexpr double smallest_volume = 0.1;  ///< of the cube of the flap's own mean edge
@@ -23,8 +23,8 @@ constexpr double mass_floor = 0.005;
 /// Of the substep that is stable at rest: a stretched surface is stiffer, and contact confines it.
 constexpr double safety = 0.4;
 
-/// How much stiffer than its wall an organ's content is when both are blown up alike. 10 keeps the volume to a tenth of what the
-/// wall alone would let it change.
+/// How much stiffer than its wall an organ's content is when both are blown up alike. 10 keeps the volume to a tenth of
+/// what the wall alone would let it change.
 constexpr double content_over_wall = 10.0;
 
 std::vector<int> find_component_roots(const MeshTopology& topology, int vertex_count) {
@@ -79,7 +79,8 @@ void add_distances(const WallStiffness& wall, const std::vector<double>& areas, 
     element.rest = edge_length(shape, static_cast<int>(e));
     element.scale = std::max(element.rest, shortest_length * shape.mean_edge);
     for (const int t : shape.topology.edge_triangles[e]) {
-      if (t >= 0) element.stiffness += wall.distance * areas[t] / 3.0;  // each triangle shares its area among three edges
+      if (t >= 0)
+        element.stiffness += wall.distance * areas[t] / 3.0;  // each triangle shares its area among three edges
     }
     shape.distances.push_back(element);
   }
@@ -97,9 +98,9 @@ void add_areas(const WallStiffness& wall, const std::vector<double>& areas, doub
   }
 }
 
-/// A flap of edge length l between triangles of area A1 and A2 turns by dV = 2 A1 A2 / (3 l) an angle. A hexagonal lattice of
-/// hinges with energy 1/2 kappa angle^2 bends like a plate of stiffness D when kappa = D l^2 / (A1 + A2) (Seung and Nelson 1988), so
-/// k = kappa (scale / dV)^2.
+/// A flap of edge length l between triangles of area A1 and A2 turns by dV = 2 A1 A2 / (3 l) an angle. A hexagonal
+/// lattice of hinges with energy 1/2 kappa angle^2 bends like a plate of stiffness D when kappa = D l^2 / (A1 + A2)
+/// (Seung and Nelson 1988), so k = kappa (scale / dV)^2.
 void add_flaps(const WallStiffness& wall, const std::vector<double>& areas, double mean_area, RestShape& shape) {
   for (std::size_t e = 0; e < shape.topology.edges.size(); ++e) {
     const auto& [t1, t2] = shape.topology.edge_triangles[e];
@@ -133,7 +134,8 @@ void add_enclosed_volume(const WallStiffness& wall, const Organ& organ, double a
   shape.enclosed.stiffness = content_over_wall * stiffness_of_wall;
 }
 
-/// d = 2 zeta sqrt(k m_C) with 1 / m_C = sum |grad_i C|^2 / m_i: `ratio` of what makes the element alone return without swinging.
+/// d = 2 zeta sqrt(k m_C) with 1 / m_C = sum |grad_i C|^2 / m_i: `ratio` of what makes the element alone return without
+/// swinging.
 template <class Kind>
 void damp(double ratio, const RestShape& shape, std::vector<Kind>& elements) {
   ElementVectors<Kind> gradient;
@@ -159,7 +161,8 @@ void damp_enclosed_volume(double ratio, RestShape& shape) {
 void add_wall_masses(const Organ& organ, const std::vector<double>& areas, RestShape& shape) {
   shape.mass.assign(shape.positions.size(), 0.0);
   for (std::size_t t = 0; t < shape.triangles.size(); ++t) {
-    for (const int v : shape.triangles[t]) shape.mass[v] += organ.material.density * organ.wall_thickness * areas[t] / 3.0;
+    for (const int v : shape.triangles[t])
+      shape.mass[v] += organ.material.density * organ.wall_thickness * areas[t] / 3.0;
   }
 }
 

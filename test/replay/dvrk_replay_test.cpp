@@ -15,8 +15,8 @@
 namespace tissue_sim {
 namespace {
 
-/// The real recording through the real forceps over the real organ, whole: every pose used, contact at least 10 mm deep, and the organ back at its
-/// rest shape within 1 % of its size one second after the forceps have left.
+/// The real recording through the real forceps over the real organ, whole: every pose used, contact at least 10 mm
+/// deep, and the organ back at its rest shape within 1 % of its size one second after the forceps have left.
 TEST(DvrkReplay, PressesTheStomachAndLetsItComeBack) {
   const std::string bag = TISSUE_SIM_SOURCE_DIR "/../shared/data/dvrk/psm2_measured.bag";
   if (!std::ifstream(bag).good()) GTEST_SKIP() << "no ../shared/data beside the repository";

@@ -112,7 +112,7 @@ instruments:
   EXPECT_EQ(scene.organs[0].colliding_set, CollidingSet::flood);
   EXPECT_EQ(scene.organs[0].depth, DepthScheme::exact);
   EXPECT_EQ(scene.organs[0].material.damping, 0.1);
-  EXPECT_EQ(scene.organs[0].material.drag, 10.0);
+  EXPECT_EQ(scene.organs[0].material.drag, 5.0);
   EXPECT_TRUE(scene.organs[0].attached.empty());
   EXPECT_EQ(scene.organs[1].wall_thickness, 0.0);
   EXPECT_EQ(scene.organs[1].material.density, 0.0);

@@ -12,9 +12,9 @@ struct OrganContact {
   int triangle = 0;                        ///< of the organ
   Vector3 barycentric = Vector3::UnitX();  ///< one entry is 1 for a colliding vertex
   Vector3 point = Vector3::Zero();
-  Vector3 direction = Vector3::UnitZ();    ///< unit, out of the instrument: the way the organ is pushed
-  double depth = 0.0;                      ///< m, how far the instrument has pushed this point from its rest place
-  Vector3 force = Vector3::Zero();         ///< N, on the organ, mean over the step
+  Vector3 direction = Vector3::UnitZ();  ///< unit, out of the instrument: the way the organ is pushed
+  double depth = 0.0;                    ///< m, how far the instrument has pushed this point from its rest place
+  Vector3 force = Vector3::Zero();       ///< N, on the organ, mean over the step
 };
 
 }  // namespace tissue_sim

@@ -8,11 +8,11 @@ namespace tissue_sim {
 
 /// The surface of an organ as contact sees it. Borrowed for the length of a call.
 struct OrganSurface {
-  const std::vector<Vector3>& positions;     ///< scene frame
+  const std::vector<Vector3>& positions;  ///< scene frame
   const std::vector<Triangle>& triangles;
   const MeshTopology& topology;
-  const std::vector<int>& component_roots;   ///< one vertex of each connected surface
-  const AabbTree& tree;                      ///< of the triangles; its boxes may be grown
+  const std::vector<int>& component_roots;  ///< one vertex of each connected surface
+  const AabbTree& tree;                     ///< of the triangles; its boxes may be grown
 };
 
 /// Where an organ edge goes through an instrument triangle. Tip frame.
@@ -34,35 +34,36 @@ struct CrossedEdge {
 /// Where the crossings put a border vertex.
 enum class Side : signed char { unknown, inside, outside, contradicted };
 
-/// What stage 1 finds between one organ and one piece of an instrument. Reused from step to step: nothing is allocated once
-/// it has been as large as it needs.
+/// What stage 1 finds between one organ and one piece of an instrument. Reused from step to step: nothing is allocated
+/// once it has been as large as it needs.
 struct Detection {
   std::vector<Crossing> crossings;
-  std::vector<CrossedEdge> crossed_edges;   ///< ascending
-  std::vector<int> border;                  ///< colliding border vertices, ascending
-  std::vector<int> border_outside;          ///< border vertices that do not collide, ascending
-  std::vector<int> colliding;               ///< all colliding vertices, ascending; the border among them
-  std::vector<Vector3> local;               ///< positions in the tip frame, where local_stamp is the current one
-  std::vector<int> crossed_edge_of;         ///< per edge, into crossed_edges, where edge_stamp is the current one
+  std::vector<CrossedEdge> crossed_edges;  ///< ascending
+  std::vector<int> border;                 ///< colliding border vertices, ascending
+  std::vector<int> border_outside;         ///< border vertices that do not collide, ascending
+  std::vector<int> colliding;              ///< all colliding vertices, ascending; the border among them
+  std::vector<Vector3> local;              ///< positions in the tip frame, where local_stamp is the current one
+  std::vector<int> crossed_edge_of;        ///< per edge, into crossed_edges, where edge_stamp is the current one
 
   int stamp = 0;
   std::vector<int> edge_stamp;
   std::vector<int> local_stamp;
   std::vector<int> side_stamp;
-  std::vector<Side> side;                   ///< per vertex, where side_stamp is the current one
+  std::vector<Side> side;  ///< per vertex, where side_stamp is the current one
   std::vector<int> candidate_edges;
-  std::vector<int> candidates;              ///< vertices of the candidate edges
+  std::vector<int> candidates;  ///< vertices of the candidate edges
   std::vector<int> stack;
-  int fallbacks = 0;                        ///< vertices decided by the closest feature, in all
+  int fallbacks = 0;  ///< vertices decided by the closest feature, in all
 };
 
 void prepare(Detection& detection, const OrganSurface& organ);
 
 /// Stage 1: crossings, border vertices and, by `set`, the colliding vertices.
 ///
-/// `flood`: from the colliding border inward over edges that nothing crosses; where the border contradicts itself (a vertex on
-/// the surface within rounding, an open instrument) the closest feature decides. `paper`: border vertices and what was
-/// colliding in the step before; `memory` (one entry a vertex) carries that from call to call and is used by `paper` only.
+/// `flood`: from the colliding border inward over edges that nothing crosses; where the border contradicts itself (a
+/// vertex on the surface within rounding, an open instrument) the closest feature decides. `paper`: border vertices and
+/// what was colliding in the step before; `memory` (one entry a vertex) carries that from call to call and is used by
+/// `paper` only.
 void detect(const OrganSurface& organ, const InstrumentSurface& instrument, const Pose& pose, CollidingSet set,
             std::vector<char>& memory, Detection& detection);
 

@@ -13,12 +13,12 @@ struct InstrumentSurface {
   std::vector<Vector3> vertices;
   std::vector<Triangle> triangles;
   MeshTopology topology;
-  std::vector<Vector3> normals;  ///< unit, one a triangle; zero where it is degenerate
+  std::vector<Vector3> normals;         ///< unit, one a triangle; zero where it is degenerate
   std::vector<Vector3> vertex_normals;  ///< unit, one a vertex, angle-weighted
-  std::vector<double> radii;            ///< m, one a vertex: of the curve of the surface there, 0 at corners and sharp edges
+  std::vector<double> radii;  ///< m, one a vertex: of the curve of the surface there, 0 at corners and sharp edges
   AabbTree tree;
   Box bounds;
-  double reach = 0.0;   ///< of its farthest point from the tip
+  double reach = 0.0;  ///< of its farthest point from the tip
   bool closed = true;
 };
 
@@ -37,8 +37,8 @@ struct ClosestFeature {
   double depth;       ///< m, positive inside
 };
 
-/// Exact depth and direction of p (tip frame). The sign is that of the pseudonormal at the closest feature; where p lies on
-/// the surface the direction is that normal. A position that is not a number is outside, far away.
+/// Exact depth and direction of p (tip frame). The sign is that of the pseudonormal at the closest feature; where p
+/// lies on the surface the direction is that normal. A position that is not a number is outside, far away.
 ClosestFeature closest_feature(const InstrumentSurface& surface, const Vector3& p);
 
 }  // namespace tissue_sim

@@ -4,8 +4,8 @@
 
 namespace tissue_sim {
 
-/// Depth (m, never negative) and direction (unit, out of the instrument, tip frame) of the colliding vertices. One entry a
-/// vertex of the organ; the entries of vertices that do not collide mean nothing.
+/// Depth (m, never negative) and direction (unit, out of the instrument, tip frame) of the colliding vertices. One
+/// entry a vertex of the organ; the entries of vertices that do not collide mean nothing.
 struct Penetration {
   std::vector<double> depth;
   std::vector<Vector3> direction;
@@ -20,9 +20,10 @@ void prepare(Penetration& penetration, const OrganSurface& organ);
 /// outweighs every other by far, as it should, and stays finite.
 double inverse_square_weight(const Vector3& a, const Vector3& b);
 
-/// Stage 2, Eq. 1-3: each colliding border vertex p from the crossings x_i on the edges that leave it, nearest one an edge, and
-/// the normals n_i of the triangles crossed there: depth = sum w_i (x_i - p) . n_i / sum w_i, direction = sum w_i n_i, unit.
-/// Where the normals cancel (a thin instrument) or none is left, the closest feature gives the direction, or both.
+/// Stage 2, Eq. 1-3: each colliding border vertex p from the crossings x_i on the edges that leave it, nearest one an
+/// edge, and the normals n_i of the triangles crossed there: depth = sum w_i (x_i - p) . n_i / sum w_i, direction = sum
+/// w_i n_i, unit. Where the normals cancel (a thin instrument) or none is left, the closest feature gives the
+/// direction, or both.
 void penetrate_border(const OrganSurface& organ, const InstrumentSurface& instrument, const Detection& detection,
                       Penetration& penetration);
 

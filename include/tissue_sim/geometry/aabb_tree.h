@@ -23,11 +23,13 @@ struct Box {
   Box grown(double by) const { return {lower.array() - by, upper.array() + by}; }
   Vector3 size() const { return upper - lower; }
 
-  /// Boxes that share a face overlap. A box with a NaN overlaps nothing. Without branches: which side fails is anybody's guess.
+  /// Boxes that share a face overlap. A box with a NaN overlaps nothing. Without branches: which side fails is
+  /// anybody's guess.
   bool overlaps(const Box& box) const {
-    return static_cast<bool>(static_cast<int>(lower.x() <= box.upper.x()) & static_cast<int>(box.lower.x() <= upper.x()) &
-                             static_cast<int>(lower.y() <= box.upper.y()) & static_cast<int>(box.lower.y() <= upper.y()) &
-                             static_cast<int>(lower.z() <= box.upper.z()) & static_cast<int>(box.lower.z() <= upper.z()));
+    return static_cast<bool>(
+        static_cast<int>(lower.x() <= box.upper.x()) & static_cast<int>(box.lower.x() <= upper.x()) &
+        static_cast<int>(lower.y() <= box.upper.y()) & static_cast<int>(box.lower.y() <= upper.y()) &
+        static_cast<int>(lower.z() <= box.upper.z()) & static_cast<int>(box.lower.z() <= upper.z()));
   }
   bool contains(const Vector3& p) const {
     return lower.x() <= p.x() && p.x() <= upper.x() && lower.y() <= p.y() && p.y() <= upper.y() && lower.z() <= p.z() &&

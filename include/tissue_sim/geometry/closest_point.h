@@ -24,14 +24,14 @@ struct ClosestOnMesh {
   ClosestOnTriangle on;
 };
 
-/// The point of the mesh nearest to p that is closer than `reach` (m). Of equal distances the lower triangle wins, so the
-/// answer does not depend on the tree. `tree` holds boxes of the triangles, grown or not. `guess` is a triangle that may well be the
-/// nearest, or -1: it changes how long the search takes and not what it finds.
+/// The point of the mesh nearest to p that is closer than `reach` (m). Of equal distances the lower triangle wins, so
+/// the answer does not depend on the tree. `tree` holds boxes of the triangles, grown or not. `guess` is a triangle
+/// that may well be the nearest, or -1: it changes how long the search takes and not what it finds.
 ClosestOnMesh closest_on_mesh(const std::vector<Vector3>& vertices, const std::vector<Triangle>& triangles,
                               const AabbTree& tree, const Vector3& p, double reach, int guess = -1);
 
-/// The outward normal (not unit) that tells inside from outside at a point of a closed surface: the face's, the sum of the
-/// two unit normals at an edge, the angle-weighted sum at a vertex (Baerentzen and Aanaes 2005).
+/// The outward normal (not unit) that tells inside from outside at a point of a closed surface: the face's, the sum of
+/// the two unit normals at an edge, the angle-weighted sum at a vertex (Baerentzen and Aanaes 2005).
 Vector3 pseudonormal(const std::vector<Vector3>& vertices, const std::vector<Triangle>& triangles,
                      const MeshTopology& topology, int triangle, Feature feature);
 

@@ -1,9 +1,8 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <array>
 #include <vector>
-
-#include <Eigen/Geometry>
 
 namespace tissue_sim {
 
@@ -40,16 +39,16 @@ MeshTopology build_topology(int vertex_count, const std::vector<Triangle>& trian
 /// What is wrong with a mesh, counted. All zero (and components > 0) for a closed, manifold, oriented surface.
 struct MeshFaults {
   int non_finite_vertices = 0;
-  int bad_indices = 0;             ///< triangles that name a vertex that is not there; nothing else is counted then
-  int repeated_corners = 0;        ///< triangles that name a vertex twice
-  int degenerate_triangles = 0;    ///< zero area in double precision, corners distinct
-  int duplicate_triangles = 0;     ///< the same three corners once more
-  int boundary_edges = 0;          ///< edges with one triangle
-  int non_manifold_edges = 0;      ///< edges with three triangles or more
-  int misoriented_edges = 0;       ///< edges that both triangles run through in the same direction
-  int non_manifold_vertices = 0;   ///< vertices whose triangles form more than one fan
+  int bad_indices = 0;            ///< triangles that name a vertex that is not there; nothing else is counted then
+  int repeated_corners = 0;       ///< triangles that name a vertex twice
+  int degenerate_triangles = 0;   ///< zero area in double precision, corners distinct
+  int duplicate_triangles = 0;    ///< the same three corners once more
+  int boundary_edges = 0;         ///< edges with one triangle
+  int non_manifold_edges = 0;     ///< edges with three triangles or more
+  int misoriented_edges = 0;      ///< edges that both triangles run through in the same direction
+  int non_manifold_vertices = 0;  ///< vertices whose triangles form more than one fan
   int unreferenced_vertices = 0;
-  int components = 0;              ///< surfaces that share no vertex
+  int components = 0;  ///< surfaces that share no vertex
 
   bool closed_manifold() const;
 };
@@ -76,7 +75,9 @@ int close_holes(TriangleMesh& mesh);
 double enclosed_volume(const TriangleMesh& mesh);
 
 /// Twice the area times the unit normal of triangle (a, b, c).
-inline Vector3 area_normal(const Vector3& a, const Vector3& b, const Vector3& c) { return (b - a).cross(c - a); }
+inline Vector3 area_normal(const Vector3& a, const Vector3& b, const Vector3& c) {
+  return (b - a).cross(c - a);
+}
 
 double mean_edge_length(const std::vector<Vector3>& vertices, const std::vector<Edge>& edges);
 

@@ -13,8 +13,8 @@ struct StampedPose {
   Pose pose;
 };
 
-/// non_finite: not a number, or farther than 1 km from the scene's origin. stale: not later than the pose before it, but by no
-/// more than time_jump_threshold. new_run: taken as the first pose of a new run, since the stamps jumped.
+/// non_finite: not a number, or farther than 1 km from the scene's origin. stale: not later than the pose before it,
+/// but by no more than time_jump_threshold. new_run: taken as the first pose of a new run, since the stamps jumped.
 enum class PoseVerdict { used, zero_stamp, non_finite, zero_quaternion, stale, new_run };
 constexpr int pose_verdicts = 6;
 const char* to_string(PoseVerdict verdict);
@@ -27,8 +27,8 @@ struct PoseTrack {
   std::deque<StampedPose> ahead;  ///< later than the time the simulation has reached
 };
 
-/// What a pose is worth in itself: `used`, or why not. Normalises the quaternion; `normalised` is set to true where that changed it
-/// by more than a thousandth.
+/// What a pose is worth in itself: `used`, or why not. Normalises the quaternion; `normalised` is set to true where
+/// that changed it by more than a thousandth.
 PoseVerdict judge_pose(StampedPose& pose, bool& normalised);
 
 }  // namespace tissue_sim

@@ -25,7 +25,8 @@ struct StepContext {
 
 void begin_report(const World& world, const Motion& motion, StepReport& report);
 
-/// As many as the elements need, and as many as keep an instrument near the organ from moving farther than the motion limit in one.
+/// As many as the elements need, and as many as keep an instrument near the organ from moving farther than the motion
+/// limit in one.
 int count_substeps(StepContext& context);
 
 void place_instruments(StepContext& context, int substep, int substeps);

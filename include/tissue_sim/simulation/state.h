@@ -11,15 +11,15 @@ namespace tissue_sim {
 
 /// What a step changes of one organ, and all that the next step reads of it.
 struct OrganState {
-  std::vector<Vector3> positions;               ///< m, scene frame
-  std::vector<Vector3> velocities;              ///< m/s
-  std::vector<Vector3> forces;                  ///< N, of the elements in the last substep
-  std::vector<double> depths;                   ///< m, 0 where no instrument presses
-  std::vector<char> held;                       ///< 1: moved by an instrument and left there (restoration off)
-  std::vector<std::vector<char>> colliding;     ///< per piece, one a vertex: the paper's memory; empty for the flood
-  std::vector<std::vector<int>> touching;       ///< per piece: vertices that were in contact in the last substep
-  std::vector<Clearance> clearances;            ///< per piece
-  bool asleep = true;                           ///< at rest and untouched: nothing to integrate
+  std::vector<Vector3> positions;            ///< m, scene frame
+  std::vector<Vector3> velocities;           ///< m/s
+  std::vector<Vector3> forces;               ///< N, of the elements in the last substep
+  std::vector<double> depths;                ///< m, 0 where no instrument presses
+  std::vector<char> held;                    ///< 1: moved by an instrument and left there (restoration off)
+  std::vector<std::vector<char>> colliding;  ///< per piece, one a vertex: the paper's memory; empty for the flood
+  std::vector<std::vector<int>> touching;    ///< per piece: vertices that were in contact in the last substep
+  std::vector<Clearance> clearances;         ///< per piece
+  bool asleep = true;                        ///< at rest and untouched: nothing to integrate
 };
 
 /// Small, flat, copied to restore or compare.

@@ -21,13 +21,13 @@ struct Motion {
   std::vector<InstrumentMotion> instruments;
 };
 
-/// Room for one organ's step. Holds nothing that changes what the next step does: how far the tree's boxes have been outrun saves work
-/// only.
+/// Room for one organ's step. Holds nothing that changes what the next step does: how far the tree's boxes have been
+/// outrun saves work only.
 struct OrganWorkspace {
   std::vector<Box> boxes;
-  AabbTree tree;                ///< of the organ's triangles, its boxes grown by `slack`
-  double slack = 0.0;           ///< m
-  double travel = 0.0;          ///< m, at most this far has any vertex gone since the tree was fitted
+  AabbTree tree;                          ///< of the organ's triangles, its boxes grown by `slack`
+  double slack = 0.0;                     ///< m
+  double travel = 0.0;                    ///< m, at most this far has any vertex gone since the tree was fitted
   std::vector<Detection> detections;      ///< per piece
   std::vector<Penetration> penetrations;  ///< per piece
   std::vector<char> near;                 ///< per piece: its box and the organ's overlap in this substep
@@ -35,8 +35,8 @@ struct OrganWorkspace {
   std::vector<Vector3> gradient;
   OrganState last_good;
 
-  std::vector<OrganContact> contacts;          ///< of the step, one a place that was pressed in any of its substeps
-  std::vector<int> contact_of;            ///< per place, into contacts, where contact_step is the current one
+  std::vector<OrganContact> contacts;  ///< of the step, one a place that was pressed in any of its substeps
+  std::vector<int> contact_of;         ///< per place, into contacts, where contact_step is the current one
   std::vector<std::uint64_t> contact_step;
 };
 

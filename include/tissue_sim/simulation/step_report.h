@@ -28,11 +28,11 @@ struct StepProfile {
 
 /// What one step did. Valid until the next one.
 struct StepReport {
-  std::uint64_t step = 0;       ///< counts from 1; never goes back, not even at a reset
-  std::int64_t stamp = 0;       ///< ns, the simulated time that the states show
-  bool pose_reached = false;    ///< the step ended on the stamp of a pose
-  bool state_due = false;       ///< state_period has passed since the last state that was due
-  bool recovered = false;       ///< the health check put the last good state back
+  std::uint64_t step = 0;     ///< counts from 1; never goes back, not even at a reset
+  std::int64_t stamp = 0;     ///< ns, the simulated time that the states show
+  bool pose_reached = false;  ///< the step ended on the stamp of a pose
+  bool state_due = false;     ///< state_period has passed since the last state that was due
+  bool recovered = false;     ///< the health check put the last good state back
   int substeps = 0;
   std::vector<OrganContact> contacts;
   std::vector<Wrench> wrenches;  ///< one an instrument

@@ -13,10 +13,10 @@
 namespace tissue_sim {
 
 struct TimelineOptions {
-  std::int64_t state_period = 16'000'000;         ///< ns
+  std::int64_t state_period = 16'000'000;          ///< ns
   std::int64_t time_jump_threshold = 500'000'000;  ///< ns
-  std::int64_t pose_timeout = 500'000'000;         ///< ns; an instrument this far behind the others is held, not waited for
-  std::int64_t longest_gap = 10'000'000'000;       ///< ns; poses farther apart than this start a new run
+  std::int64_t pose_timeout = 500'000'000;    ///< ns; an instrument this far behind the others is held, not waited for
+  std::int64_t longest_gap = 10'000'000'000;  ///< ns; poses farther apart than this start a new run
   bool newest_only = false;  ///< true: steps go to the newest pose and the ones before it are passed over
 };
 
@@ -24,7 +24,7 @@ struct TimelineCounters {
   std::array<std::uint64_t, pose_verdicts> poses{};  ///< by PoseVerdict
   std::uint64_t poses_superseded = 0;                ///< passed over by newest_only
   std::uint64_t normalised_quaternions = 0;
-  std::uint64_t recoveries = 0;                      ///< by the health check
+  std::uint64_t recoveries = 0;  ///< by the health check
   std::uint64_t resets = 0;
 };
 
@@ -76,8 +76,8 @@ class Timeline {
   OrganView organ(int index) const;
   OrganSummary summary(int organ) const;
   const TimelineCounters& counters() const;
-  std::uint64_t hash() const;  ///< of every state since construction, over positions, velocities and depths
-  std::int64_t now() const;    ///< ns, the stamp of the last step or of the first pose; 0 before that
+  std::uint64_t hash() const;     ///< of every state since construction, over positions, velocities and depths
+  std::int64_t now() const;       ///< ns, the stamp of the last step or of the first pose; 0 before that
   double kinetic_energy() const;  ///< J
   double elastic_energy() const;  ///< J
   int active_vertices() const;

@@ -14,9 +14,9 @@ struct OrganModel {
   bool restoration = true;
   CollidingSet colliding_set = CollidingSet::flood;
   DepthScheme depth = DepthScheme::exact;
-  double drag = 0.0;          ///< 1/s
+  double drag = 0.0;                     ///< 1/s
   std::vector<std::vector<int>> poking;  ///< per piece: its vertices that may poke into a triangle of this organ
-  double motion_limit = 0.0;  ///< m, the farthest an instrument may move between two contact passes
+  double motion_limit = 0.0;             ///< m, the farthest an instrument may move between two contact passes
 };
 
 /// One rigid piece of an instrument.

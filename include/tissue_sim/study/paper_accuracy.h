@@ -22,8 +22,8 @@ struct DepthAccuracy {
 };
 DepthAccuracy measure_depths(const PaperTest& test);
 
-/// A way of the instrument through the undeformed organ and what the two colliding sets make of it, against an exact inside test of
-/// every vertex. Vertices within a nanometre of the instrument's surface count on neither side.
+/// A way of the instrument through the undeformed organ and what the two colliding sets make of it, against an exact
+/// inside test of every vertex. Vertices within a nanometre of the instrument's surface count on neither side.
 struct SetMotion {
   const char* name = "";
   std::vector<Vector3> centres;

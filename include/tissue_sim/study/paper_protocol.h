@@ -29,22 +29,23 @@ struct PaperTest {
 };
 extern const std::array<PaperTest, 9> paper_tests;
 
-/// The instrument's centre at every step: along x from 2.2 R to 0.4 R in 200 steps (the cap inside is then 40 % of the organ's area),
-/// then at 0.4 R up to 1.131 R, down to -1.131 R (20 % of the area) and back in 400 steps.
+/// The instrument's centre at every step: along x from 2.2 R to 0.4 R in 200 steps (the cap inside is then 40 % of the
+/// organ's area), then at 0.4 R up to 1.131 R, down to -1.131 R (20 % of the area) and back in 400 steps.
 std::vector<Vector3> paper_path();
 
 /// The rigid sphere is turned a little, so that no grid lines of the two fall together.
 Pose paper_pose(const Vector3& centre);
 
-/// The organ is attached by the 10 % of its area farthest from the instrument's start. Its stiffness is chosen for each mesh
-/// so that the elements need one substep of the 1 ms step; only the time of a step is looked at. Depths by Eq. 1-6.
+/// The organ is attached by the 10 % of its area farthest from the instrument's start. Its stiffness is chosen for each
+/// mesh so that the elements need one substep of the 1 ms step; only the time of a step is looked at. Depths by Eq.
+/// 1-6.
 Scene paper_scene(const PaperTest& test, Approach approach);
 
 struct PaperResult {
-  StepProfile mean;            ///< s, over the steps with contact
+  StepProfile mean;  ///< s, over the steps with contact
   int steps_with_contact = 0;
-  int substeps = 0;            ///< the most that a step took
-  int recoveries = 0;          ///< by the health check
+  int substeps = 0;    ///< the most that a step took
+  int recoveries = 0;  ///< by the health check
   std::uint64_t hash = 0;
 };
 PaperResult run_paper_test(const PaperTest& test, Approach approach);

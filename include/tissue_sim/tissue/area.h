@@ -6,10 +6,11 @@
 
 namespace tissue_sim {
 
-/// Area preservation, Eq. 7 of the paper with the norm that its print lacks: C = (1/2 |(p_j - p_i) x (p_k - p_i)| - A0) / A0.
+/// Area preservation, Eq. 7 of the paper with the norm that its print lacks: C = (1/2 |(p_j - p_i) x (p_k - p_i)| - A0)
+/// / A0.
 struct AreaElement : Element<3> {
-  /// The area grows fastest when a corner moves in the plane, away from the opposite side: 1/2 n x side. A triangle without
-  /// area has no normal: the gradient is zero there.
+  /// The area grows fastest when a corner moves in the plane, away from the opposite side: 1/2 n x side. A triangle
+  /// without area has no normal: the gradient is zero there.
   double evaluate(const ElementVectors<AreaElement>& x, ElementVectors<AreaElement>& gradient) const {
     const Vector3 normal = area_normal(x[0], x[1], x[2]);
     const double twice_area = normal.norm();

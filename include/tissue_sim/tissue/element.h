@@ -33,9 +33,9 @@ ElementVectors<Kind> gather(const Kind& element, const std::vector<Vector3>& of_
   return of_element;
 }
 
-/// What bounds the stiffness of stretched elements: areas and volumes stiffen with every stretch, and a substep that is stable at rest is
-/// not for ever. k sum |grad_i C|^2 / m_i, the square of the frequency of the element alone, counts up to `stiffest` only: an element
-/// beyond it is softened to it.
+/// What bounds the stiffness of stretched elements: areas and volumes stiffen with every stretch, and a substep that is
+/// stable at rest is not for ever. k sum |grad_i C|^2 / m_i, the square of the frequency of the element alone, counts
+/// up to `stiffest` only: an element beyond it is softened to it.
 struct StiffnessLimit {
   const std::vector<double>& inverse_mass;  ///< 1/kg, one a vertex
   double stiffest;                          ///< 1/s^2

@@ -12,9 +12,10 @@ struct WallStiffness {
   double membrane = 0.0;  ///< E h, N/m
 };
 
-/// The wall of an organ as distance and area elements. The average over all directions of the plane of sigma_D/2 (e.n.n)^2 gives
-/// mu = lambda = sigma_D/8, the area elements add sigma_A to lambda, and plane stress asks for mu = E h / (2 (1 + nu)) and
-/// lambda = E h nu / (1 - nu^2). Hence sigma_D = 4 E h / (1 + nu) and sigma_A = lambda - mu, which is not negative for nu >= 1/3.
+/// The wall of an organ as distance and area elements. The average over all directions of the plane of sigma_D/2
+/// (e.n.n)^2 gives mu = lambda = sigma_D/8, the area elements add sigma_A to lambda, and plane stress asks for mu = E h
+/// / (2 (1 + nu)) and lambda = E h nu / (1 - nu^2). Hence sigma_D = 4 E h / (1 + nu) and sigma_A = lambda - mu, which
+/// is not negative for nu >= 1/3.
 WallStiffness wall_stiffness(const Material& material, double wall_thickness);
 
 }  // namespace tissue_sim

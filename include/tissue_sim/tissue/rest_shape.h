@@ -10,7 +10,8 @@
 
 namespace tissue_sim {
 
-/// What is known of an organ before anything moves: topology, rest measures, masses, elements. Built once, never changed.
+/// What is known of an organ before anything moves: topology, rest measures, masses, elements. Built once, never
+/// changed.
 struct RestShape {
   std::vector<Vector3> positions;
   std::vector<Triangle> triangles;
@@ -29,7 +30,7 @@ struct RestShape {
   std::vector<AreaElement> areas;
   std::vector<VolumeElement> flaps;
   EnclosedVolume enclosed;
-  double stable_substep = 0.0;   ///< s; 0: nothing to integrate
+  double stable_substep = 0.0;    ///< s; 0: nothing to integrate
   double stiffest_element = 0.0;  ///< 1/s^2, see stiffest_element()
 
   bool elastic() const { return !distances.empty(); }

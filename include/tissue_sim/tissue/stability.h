@@ -4,18 +4,18 @@
 
 namespace tissue_sim {
 
-/// Raises the mass of the few vertices that would force tiny substeps, by at most `fraction` of the organ's mass in all.
-/// Vertex i can vibrate no faster than omega_i^2 = (sum over its elements of k |grad_i C| sum_j |grad_j C|) / m_i (Gershgorin);
-/// the lowest common bound on omega_i that the fraction pays for is found and met.
+/// Raises the mass of the few vertices that would force tiny substeps, by at most `fraction` of the organ's mass in
+/// all. Vertex i can vibrate no faster than omega_i^2 = (sum over its elements of k |grad_i C| sum_j |grad_j C|) / m_i
+/// (Gershgorin); the lowest common bound on omega_i that the fraction pays for is found and met.
 void apply_mass_floor(double fraction, RestShape& shape);
 
-/// The substep (s) at which the explicit integrator stays stable, `safety` times the bound. Stability of the symplectic step needs
-/// (dt omega / 2)^2 + dt lambda / 2 < 1, where omega^2 and lambda are the largest eigenvalues of stiffness and damping over mass,
-/// taken at rest by power iteration.
+/// The substep (s) at which the explicit integrator stays stable, `safety` times the bound. Stability of the symplectic
+/// step needs (dt omega / 2)^2 + dt lambda / 2 < 1, where omega^2 and lambda are the largest eigenvalues of stiffness
+/// and damping over mass, taken at rest by power iteration.
 double stable_substep(const RestShape& shape, double safety);
 
-/// The largest k sum |grad_i C|^2 / m_i of an element at the given positions, 1/s^2: the square of the frequency at which the fastest
-/// element alone would vibrate. Areas and volumes stiffen when they are stretched.
+/// The largest k sum |grad_i C|^2 / m_i of an element at the given positions, 1/s^2: the square of the frequency at
+/// which the fastest element alone would vibrate. Areas and volumes stiffen when they are stretched.
 double stiffest_element(const RestShape& shape, const std::vector<Vector3>& positions);
 
 }  // namespace tissue_sim

@@ -6,9 +6,9 @@
 
 namespace tissue_sim {
 
-/// Volume preservation, Eq. 8 of the paper: C = (1/6 (p_j - p_i) . ((p_k - p_i) x (p_l - p_i)) - V0) / V0, signed and so smooth
-/// everywhere. On a surface the four vertices are those of the two triangles at an edge, a flap: its volume changes when the
-/// surface bends there.
+/// Volume preservation, Eq. 8 of the paper: C = (1/6 (p_j - p_i) . ((p_k - p_i) x (p_l - p_i)) - V0) / V0, signed and
+/// so smooth everywhere. On a surface the four vertices are those of the two triangles at an edge, a flap: its volume
+/// changes when the surface bends there.
 struct VolumeElement : Element<4> {
   double evaluate(const ElementVectors<VolumeElement>& x, ElementVectors<VolumeElement>& gradient) const {
     const Vector3 a = x[1] - x[0];
