@@ -48,18 +48,21 @@ void penetrate_border(const OrganSurface& organ, const InstrumentSurface& instru
       penetration.depth[vertex] = std::max(0.0, depth_sum / weight_sum);
       penetration.direction[vertex] = normal_sum.normalized();
     } else {
-      const ClosestFeature closest = closest_feature(instrument, p);
-      penetration.depth[vertex] = std::max(0.0, closest.depth);
-      penetration.direction[vertex] = closest.direction;
+      take_closest_feature(instrument, detection, vertex, penetration);
     }
   }
 }
 
+void take_closest_feature(const InstrumentSurface& instrument, const Detection& detection, int vertex,
+                          Penetration& penetration) {
+  const ClosestFeature closest = closest_feature(instrument, detection.local[vertex]);
+  penetration.depth[vertex] = std::max(0.0, closest.depth);
+  penetration.direction[vertex] = closest.direction;
+}
+
 void penetrate_exactly(const InstrumentSurface& instrument, const Detection& detection, Penetration& penetration) {
   for (const int vertex : detection.colliding) {
-    const ClosestFeature closest = closest_feature(instrument, detection.local[vertex]);
-    penetration.depth[vertex] = std::max(0.0, closest.depth);
-    penetration.direction[vertex] = closest.direction;
+    take_closest_feature(instrument, detection, vertex, penetration);
   }
 }
 

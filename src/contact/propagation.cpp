@@ -40,9 +40,7 @@ void take_from_neighbours(const OrganSurface& organ, const InstrumentSurface& in
     penetration.depth[vertex] = std::max(0.0, depth_sum / weight_sum);
     penetration.direction[vertex] = direction_sum.normalized();
   } else {
-    const ClosestFeature closest = closest_feature(instrument, p);
-    penetration.depth[vertex] = std::max(0.0, closest.depth);
-    penetration.direction[vertex] = closest.direction;
+    take_closest_feature(instrument, detection, vertex, penetration);
   }
 }
 
@@ -74,9 +72,7 @@ void propagate(const OrganSurface& organ, const InstrumentSurface& instrument, c
 
   for (const int vertex : detection.colliding) {
     if (penetration.layer_of[vertex] == not_reached) {
-      const ClosestFeature closest = closest_feature(instrument, detection.local[vertex]);
-      penetration.depth[vertex] = std::max(0.0, closest.depth);
-      penetration.direction[vertex] = closest.direction;
+      take_closest_feature(instrument, detection, vertex, penetration);
     }
     penetration.layer_of[vertex] = not_colliding;
   }

@@ -27,6 +27,10 @@ double inverse_square_weight(const Vector3& a, const Vector3& b);
 void penetrate_border(const OrganSurface& organ, const InstrumentSurface& instrument, const Detection& detection,
                       Penetration& penetration);
 
+/// Depth and direction of one vertex from the closest feature of the instrument; no depth where the vertex is outside.
+void take_closest_feature(const InstrumentSurface& instrument, const Detection& detection, int vertex,
+                          Penetration& penetration);
+
 /// The exact way in place of stages 2 and 3: the closest point of the instrument for every colliding vertex.
 void penetrate_exactly(const InstrumentSurface& instrument, const Detection& detection, Penetration& penetration);
 
