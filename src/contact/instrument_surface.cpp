@@ -45,10 +45,9 @@ InstrumentSurface build_instrument_surface(const TriangleMesh& mesh, bool closed
   surface.closed = closed;
   for (const Vector3& v : mesh.vertices) surface.reach = std::max(surface.reach, v.norm());
 
-  std::vector<Box> boxes(mesh.triangles.size());
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    const auto& [a, b, c] = mesh.triangles[t];
-    for (const int v : {a, b, c}) boxes[t].add(mesh.vertices[v]);
+  std::vector<Box> boxes;
+  fit_boxes(mesh.vertices, mesh.triangles, 0.0, boxes);
+  for (const auto& [a, b, c] : mesh.triangles) {
     surface.normals.push_back(area_normal(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]).stableNormalized());
   }
   surface.tree.build(boxes);

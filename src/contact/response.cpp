@@ -29,11 +29,6 @@ Mobility mobility(const ContactPoint& point, const std::vector<double>& inverse_
   return {std::max(sum, 0.5 * most), sum < 0.5 * most};
 }
 
-Vector3 at_point(const ContactPoint& point, const std::vector<Vector3>& of_vertices) {
-  return point.weights[0] * of_vertices[point.vertices[0]] + point.weights[1] * of_vertices[point.vertices[1]] +
-         point.weights[2] * of_vertices[point.vertices[2]];
-}
-
 }  // namespace
 
 double push_out(const std::vector<ContactPoint>& points, const std::vector<double>& inverse_mass,

@@ -11,6 +11,16 @@ Box bounds_of(const std::vector<Vector3>& points) {
   return box;
 }
 
+void fit_boxes(const std::vector<Vector3>& vertices, const std::vector<Triangle>& triangles, double margin,
+               std::vector<Box>& boxes) {
+  boxes.resize(triangles.size());
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    Box box;
+    for (const int v : triangles[t]) box.add(vertices[v]);
+    boxes[t] = box.grown(margin);
+  }
+}
+
 void AabbTree::build(const std::vector<Box>& boxes) {
   nodes_.clear();
   items_.resize(boxes.size());

@@ -45,11 +45,7 @@ double angle_between(const Pose& a, const Pose& b) {
 }
 
 void fit_tree(const OrganModel& model, const OrganState& state, OrganWorkspace& work) {
-  for (std::size_t t = 0; t < work.boxes.size(); ++t) {
-    Box box;
-    for (const int v : model.rest.triangles[t]) box.add(state.positions[v]);
-    work.boxes[t] = box.grown(work.slack);
-  }
+  fit_boxes(state.positions, model.rest.triangles, work.slack, work.boxes);
   work.tree.refit(work.boxes);
   work.travel = 0.0;
 }
@@ -101,8 +97,7 @@ void record_contact(StepContext& context, const ContactPoint& point) {
 
 void push_on_instrument(StepContext& context, const ContactPoint& point) {
   const int instrument = context.world.pieces[point.piece].instrument;
-  Vector3 place = Vector3::Zero();
-  for (int i = 0; i < 3; ++i) place += point.weights[i] * context.state.positions[point.vertices[i]];
+  const Vector3 place = at_point(point, context.state.positions);
   const Vector3 force = -point.impulse / context.motion.duration * point.direction;
   Wrench& wrench = context.report.wrenches[instrument];
   wrench.force += force;
@@ -120,10 +115,7 @@ Workspace build_workspace(const World& world) {
     const RestShape& rest = model.rest;
     OrganWorkspace& work = workspace.organs.emplace_back();
     work.slack = slack_fraction * rest.mean_edge;
-    work.boxes.resize(rest.triangles.size());
-    for (std::size_t t = 0; t < rest.triangles.size(); ++t) {
-      for (const int v : rest.triangles[t]) work.boxes[t].add(rest.positions[v]);
-    }
+    fit_boxes(rest.positions, rest.triangles, 0.0, work.boxes);
     work.tree.build(work.boxes);
     work.detections.resize(world.pieces.size());
     work.penetrations.resize(world.pieces.size());
@@ -292,8 +284,7 @@ void respond(StepContext& context) {
   context.state.asleep = context.state.asleep && !rest.elastic();
   for (ContactPoint& point : work.points) {
     const int instrument = context.world.pieces[point.piece].instrument;
-    Vector3 place = Vector3::Zero();
-    for (int i = 0; i < 3; ++i) place += point.weights[i] * context.state.positions[point.vertices[i]];
+    const Vector3 place = at_point(point, context.state.positions);
     point.instrument_velocity =
         velocity_of(context.workspace.before[instrument], context.workspace.now[instrument], place, context.dt);
   }

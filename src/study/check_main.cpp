@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 
+#include "tissue_sim/geometry/aabb_tree.h"
 #include "tissue_sim/scene/scene_file.h"
 #include "tissue_sim/simulation/timeline.h"
 
@@ -20,15 +21,6 @@ constexpr const char* usage =
 constexpr int timed_steps = 100;
 constexpr double timed_press = 0.005;  // m
 
-Vector3 extent(const TriangleMesh& mesh) {
-  Vector3 low = mesh.vertices.front(), high = low;
-  for (const Vector3& p : mesh.vertices) {
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  }
-  return high - low;
-}
-
 void row(const char* name, const std::string& value) {
   std::printf("  %-22s %s\n", name, value.c_str());
 }
@@ -41,7 +33,7 @@ std::string text(const char* format, Values... values) {
 }
 
 std::string size_text(const TriangleMesh& mesh) {
-  const Vector3 size = extent(mesh);
+  const Vector3 size = bounds_of(mesh.vertices).size();
   return text("%.4g x %.4g x %.4g m", size.x(), size.y(), size.z());
 }
 
@@ -154,7 +146,7 @@ void print_cost(const Scene& scene) {
   const auto height = [&](double above) { return Pose{place + (above + reach) * normal, orientation}; };
 
   int apart_contacts = 0, press_contacts = 0;
-  const double far = 10.0 * (extent(scene.organs[0].mesh).norm() + 1.0);
+  const double far = 10.0 * (bounds_of(scene.organs[0].mesh.vertices).size().norm() + 1.0);
   const double apart = time_steps(
       scene, [&](int) { return height(far); }, apart_contacts);
   const double press = time_steps(

@@ -21,10 +21,8 @@ struct Pair {
       : organ(build_rest_shape(paper_scene(test, Approach::contact_only).organs.front())),
         instrument(build_instrument_surface(make_sphere(paper_radius, test.rigid), true)),
         memory(organ.positions.size(), 0) {
-    std::vector<Box> boxes(organ.triangles.size());
-    for (std::size_t t = 0; t < boxes.size(); ++t) {
-      for (const int v : organ.triangles[t]) boxes[t].add(organ.positions[v]);
-    }
+    std::vector<Box> boxes;
+    fit_boxes(organ.positions, organ.triangles, 0.0, boxes);
     tree.build(boxes);
     prepare(detection, surface());
     prepare(penetration, surface());

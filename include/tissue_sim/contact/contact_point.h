@@ -20,6 +20,12 @@ struct ContactPoint {
   double impulse = 0.0;                           ///< N s along direction, on the organ; set by the response
 };
 
+/// Position, velocity or any other vector at the point, from those of all vertices.
+inline Vector3 at_point(const ContactPoint& point, const std::vector<Vector3>& of_vertices) {
+  return point.weights[0] * of_vertices[point.vertices[0]] + point.weights[1] * of_vertices[point.vertices[1]] +
+         point.weights[2] * of_vertices[point.vertices[2]];
+}
+
 /// m; what touches an instrument within this distance goes on touching, and points of triangles are kept this far out.
 constexpr double contact_margin = 0.02e-3;
 

@@ -42,6 +42,11 @@ struct Box {
 
 Box bounds_of(const std::vector<Vector3>& points);
 
+/// The box of each triangle, grown by `margin` (m). Allocates only where `boxes` has fewer entries than there are
+/// triangles.
+void fit_boxes(const std::vector<Vector3>& vertices, const std::vector<Triangle>& triangles, double margin,
+               std::vector<Box>& boxes);
+
 /// A binary tree of boxes over items 0 .. n - 1. The shape is fixed when it is built; refit() follows items that move.
 class AabbTree {
  public:
