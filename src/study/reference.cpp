@@ -1,0 +1,506 @@
+#include "tissue_sim/study/reference.h"
+
+#include <Eigen/CholmodSupport>
+#include <Eigen/SparseCore>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace tissue_sim {
+
+namespace {
+
+using Vectors = std::vector<Vector3>;
+using SparseMatrix = Eigen::SparseMatrix<double>;
+
+constexpr double armijo = 1e-4;            ///< 1, of the decrease that the slope promises
+constexpr double energy_rounding = 1e-14;  ///< 1, of the energies summed: below it a rise says nothing
+constexpr int halvings = 30;               ///< of a Newton step before it is taken as it is
+constexpr int free_changes = 4;            ///< a vertex that was let go more often waits until the others are at rest
+constexpr double length_rounding = 1e-12;  ///< 1, of the solid's size: nearer is there
+constexpr double loose = 1e-3;             ///< 1, tolerance of the load steps before the last
+constexpr double grazing = 0.1;            ///< 1, of a contact's direction along the free axes; less can push nothing
+
+/// The lower triangle of a symmetric matrix of 3 x 3 blocks, a block for every two vertices that share a tetrahedron.
+struct BlockMatrix {
+  FlatLists columns;                          ///< a vertex: itself, then its neighbours of higher index, ascending
+  std::vector<Matrix3> blocks;                ///< one an item of the columns
+  std::vector<std::array<int, 10>> elements;  ///< a tetrahedron: the block of each of its pairs (see corner_pairs)
+};
+
+constexpr std::array<std::array<std::size_t, 2>, 10> corner_pairs = {
+    {{0, 0}, {1, 1}, {2, 2}, {3, 3}, {0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}}};
+
+BlockMatrix build_blocks(int vertex_count, const std::vector<Tetrahedron>& tetrahedra) {
+  std::vector<std::vector<int>> columns(static_cast<std::size_t>(vertex_count));
+  for (int v = 0; v < vertex_count; ++v) columns[static_cast<std::size_t>(v)].push_back(v);
+  for (const Tetrahedron& corners : tetrahedra) {
+    for (const auto& [i, j] : corner_pairs) {
+      if (i != j)
+        columns[static_cast<std::size_t>(std::min(corners[i], corners[j]))].push_back(std::max(corners[i], corners[j]));
+    }
+  }
+  BlockMatrix result;
+  result.columns.first.push_back(0);
+  for (std::vector<int>& column : columns) {
+    std::sort(column.begin(), column.end());
+    column.erase(std::unique(column.begin(), column.end()), column.end());
+    result.columns.items.insert(result.columns.items.end(), column.begin(), column.end());
+    result.columns.first.push_back(static_cast<int>(result.columns.items.size()));
+  }
+  result.blocks.resize(result.columns.items.size());
+  for (const Tetrahedron& corners : tetrahedra) {
+    std::array<int, 10> places{};
+    for (std::size_t pair = 0; pair < corner_pairs.size(); ++pair) {
+      const auto [i, j] = corner_pairs[pair];
+      const int column = std::min(corners[i], corners[j]);
+      const int* end = result.columns.end(column);
+      const int* found = std::lower_bound(result.columns.begin(column), end, std::max(corners[i], corners[j]));
+      places[pair] = static_cast<int>(found - result.columns.items.data());
+    }
+    result.elements.push_back(places);
+  }
+  return result;
+}
+
+/// The compressed columns of the scalar matrix; only its values change later.
+SparseMatrix build_pattern(const BlockMatrix& matrix) {
+  const auto n = static_cast<int>(matrix.columns.first.size()) - 1;
+  std::vector<Eigen::Triplet<double>> entries;
+  entries.reserve(matrix.blocks.size() * 9);
+  for (int column = 0; column < n; ++column) {
+    for (const int* row = matrix.columns.begin(column); row != matrix.columns.end(column); ++row) {
+      for (int b = 0; b < 3; ++b) {
+        for (int a = *row == column ? b : 0; a < 3; ++a) entries.emplace_back(3 * *row + a, 3 * column + b, 1.0);
+      }
+    }
+  }
+  SparseMatrix result(3 * n, 3 * n);
+  result.setFromTriplets(entries.begin(), entries.end());
+  return result;
+}
+
+/// The directions a vertex is held in: of three orthonormal ones, and how far it has yet to go along each.
+struct Hold {
+  Matrix3 frame = Matrix3::Identity();  ///< in its columns
+  std::array<bool, 3> held{};
+  Vector3 way{0, 0, 0};  ///< m, along the held ones
+};
+
+class Solver {
+ public:
+  Solver(const ReferenceProblem& given, const ReferenceOptions& given_options);
+  ReferenceSolution solve();
+
+ private:
+  bool settle(double load, double tolerance);
+  double evaluate(const Vectors& x, double load, Vectors& gradient, double& size) const;
+  ObstaclePoint obstacle_at(const Vector3& x, double load) const;
+  Vector3 along_free(int vertex, const Vector3& direction) const;
+  Hold hold(int vertex, double load) const;
+  void touch(double load);
+  void let_go(double load, const Vectors& gradient);
+  void measure(const Vectors& gradient);
+  void fill_blocks();
+  bool factorise(Eigen::VectorXd& right);
+  void fill_matrix(Eigen::VectorXd& right);
+  Vectors moved(const Vectors& step, double part, double load) const;
+
+  const ReferenceProblem& problem;
+  const ReferenceOptions& options;
+  int count;
+  double length = 0.0;  ///< m, of the solid's box
+  std::vector<NeoHookeanElement> elements;
+  std::vector<std::array<bool, 3>> fixed;
+  Vectors prescribed;
+  Vectors forces;
+  std::vector<int> surface;
+  BlockMatrix blocks;
+  SparseMatrix matrix;
+  Eigen::CholmodSupernodalLLT<SparseMatrix, Eigen::Lower> factor;
+
+  Vectors x;
+  std::vector<Hold> holds;
+  std::vector<char> touching;
+  std::vector<int> releases;
+  std::vector<ObstaclePoint> points;  ///< of the touching vertices
+  std::vector<double> pushes;         ///< N, of the obstacle on them
+  bool changed = false;               ///< the active set, in this iteration
+  double left_over = 0.0;             ///< N
+  double reaction = 0.0;              ///< N
+  int iterations = 0;
+};
+
+std::size_t at(int index) {
+  return static_cast<std::size_t>(index);
+}
+
+void check_size(std::size_t size, std::size_t expected, const char* name) {
+  if (size == 0 || size == expected) return;
+  throw std::invalid_argument(std::string("ReferenceProblem: ") + name + " has " + std::to_string(size) +
+                              " entries, expected none or " + std::to_string(expected));
+}
+
+Solver::Solver(const ReferenceProblem& given, const ReferenceOptions& given_options)
+    : problem(given), options(given_options), count(static_cast<int>(given.mesh.vertices.size())) {
+  const std::vector<Tetrahedron>& tetrahedra = problem.mesh.tetrahedra;
+  const std::size_t n = at(count);
+  if (problem.moduli.size() != 1 && problem.moduli.size() != tetrahedra.size()) {
+    throw std::invalid_argument("ReferenceProblem: moduli: expected one for all or one a tetrahedron");
+  }
+  check_size(problem.fixed.size(), n, "fixed");
+  check_size(problem.prescribed.size(), n, "prescribed");
+  check_size(problem.forces.size(), n, "forces");
+  check_size(options.start.size(), n, "start");
+  fixed = problem.fixed;
+  fixed.resize(n);
+  prescribed = problem.prescribed;
+  prescribed.resize(n, Vector3::Zero());
+  forces = problem.forces;
+  forces.resize(n, Vector3::Zero());
+
+  std::vector<char> used(n, 0);
+  for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
+    NeoHookeanElement::Vectors corners;
+    for (std::size_t i = 0; i < 4; ++i) {
+      corners[i] = problem.mesh.vertices[at(tetrahedra[t][i])];
+      used[at(tetrahedra[t][i])] = 1;
+    }
+    elements.push_back(
+        NeoHookeanElement::at_rest(tetrahedra[t], corners, problem.moduli[problem.moduli.size() == 1 ? 0 : t]));
+    if (!(elements.back().volume > 0.0)) {
+      throw std::invalid_argument("ReferenceProblem: tetrahedron " + std::to_string(t) + " has no volume");
+    }
+  }
+  Eigen::AlignedBox3d box;
+  for (std::size_t v = 0; v < n; ++v) {
+    if (used[v] == 0) fixed[v] = {true, true, true};  // nothing would hold it
+    box.extend(problem.mesh.vertices[v]);
+  }
+  length = box.isEmpty() ? 0.0 : box.diagonal().norm();
+  if (problem.obstacle) {
+    for (const int v : problem.surface) {
+      if (!(fixed[at(v)][0] && fixed[at(v)][1] && fixed[at(v)][2])) surface.push_back(v);
+    }
+  }
+  x = options.start.empty() ? problem.mesh.vertices : options.start;
+  holds.resize(n);
+  touching.assign(n, 0);
+  releases.assign(n, 0);
+  points.resize(n);
+  pushes.assign(n, 0.0);
+  blocks = build_blocks(count, tetrahedra);
+  matrix = build_pattern(blocks);
+  factor.cholmod().print = 0;  // a matrix that is not positive definite is expected, and met with a shift
+  factor.analyzePattern(matrix);
+}
+
+/// Energy in J of the solid and its loads; its gradient in N; the size of what was summed, for the rounding.
+double Solver::evaluate(const Vectors& positions, double load, Vectors& gradient, double& size) const {
+  double energy = 0.0;
+  gradient.assign(at(count), Vector3::Zero());
+  for (const NeoHookeanElement& element : elements) {
+    NeoHookeanElement::Vectors corners;
+    NeoHookeanElement::Vectors pull;
+    for (std::size_t i = 0; i < 4; ++i) corners[i] = positions[at(element.vertices[i])];
+    energy += element.evaluate(corners, pull);
+    for (std::size_t i = 0; i < 4; ++i) gradient[at(element.vertices[i])] += pull[i];
+  }
+  size = std::abs(energy);
+  for (std::size_t v = 0; v < at(count); ++v) {
+    const double work = load * forces[v].dot(positions[v] - problem.mesh.vertices[v]);
+    energy -= work;
+    size += std::abs(work);
+    gradient[v] -= load * forces[v];
+  }
+  return energy;
+}
+
+ObstaclePoint Solver::obstacle_at(const Vector3& position, double load) const {
+  return problem.obstacle(position + (1.0 - load) * problem.approach);
+}
+
+Vector3 Solver::along_free(int vertex, const Vector3& direction) const {
+  Vector3 result = direction;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (fixed[at(vertex)][at(axis)]) result[axis] = 0.0;
+  }
+  return result;
+}
+
+Hold Solver::hold(int vertex, double load) const {
+  const std::size_t v = at(vertex);
+  Hold result;
+  result.held = fixed[v];
+  const Vector3 goal = problem.mesh.vertices[v] + load * prescribed[v];
+  int first_free = -1;
+  int fixed_axis = -1;
+  int free_axes = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (fixed[v][at(axis)]) {
+      result.way[axis] = goal[axis] - x[v][axis];
+      fixed_axis = axis;
+    } else {
+      if (first_free < 0) first_free = axis;
+      ++free_axes;
+    }
+  }
+  if (touching[v] == 0) return result;
+  const Vector3 push = along_free(vertex, points[v].direction);
+  const Vector3 normal = push.normalized();
+  const double way = points[v].depth / push.norm();
+  if (free_axes == 1) {
+    result.held = {true, true, true};
+    result.way[first_free] = way * normal[first_free];
+    return result;
+  }
+  const Vector3 beside = free_axes == 2 ? Vector3(Vector3::Unit(fixed_axis)) : normal.unitOrthogonal();
+  const double fixed_way = free_axes == 2 ? result.way[fixed_axis] : 0.0;
+  result.frame << normal, beside, normal.cross(beside);
+  result.held = {true, free_axes == 2, false};
+  result.way = Vector3(way, fixed_way, 0.0);
+  return result;
+}
+
+/// Takes into the active set what is inside the obstacle.
+void Solver::touch(double load) {
+  for (const int vertex : surface) {
+    const std::size_t v = at(vertex);
+    const ObstaclePoint point = obstacle_at(x[v], load);
+    if (touching[v] == 0) {
+      if (!(point.depth > length_rounding * length)) continue;
+      if (!(along_free(vertex, point.direction).norm() > grazing)) continue;
+      touching[v] = 1;
+      changed = true;
+    }
+    points[v] = point;
+  }
+}
+
+/// Lets go what the obstacle would have to pull.
+void Solver::let_go(double load, const Vectors& gradient) {
+  const double slack = options.tolerance * reaction;
+  int worst = -1;
+  for (const int vertex : surface) {
+    const std::size_t v = at(vertex);
+    if (touching[v] == 0 || !(pushes[v] < -slack)) continue;
+    if (releases[v] < free_changes) {
+      ++releases[v];
+      touching[v] = 0;
+      changed = true;
+    } else if (worst < 0 || pushes[v] < pushes[at(worst)]) {
+      worst = vertex;
+    }
+  }
+  // The others go one at a time, each from an equilibrium: so the energy falls from one to the next, and no set of
+  // touching vertices comes again.
+  if (worst >= 0 && !changed && left_over <= options.tolerance * reaction) {
+    touching[at(worst)] = 0;
+    changed = true;
+  }
+  if (!changed) return;
+  for (const int vertex : surface) holds[at(vertex)] = hold(vertex, load);
+  measure(gradient);
+}
+
+/// The forces left over, the reactions, and what each contact pushes with.
+void Solver::measure(const Vectors& gradient) {
+  double left = 0.0;
+  double held = 0.0;
+  for (std::size_t v = 0; v < at(count); ++v) {
+    const Vector3 local = holds[v].frame.transpose() * gradient[v];
+    for (int a = 0; a < 3; ++a) (holds[v].held[at(a)] ? held : left) += local[a] * local[a];
+    if (touching[v] == 0) continue;
+    const Vector3 push = along_free(static_cast<int>(v), points[v].direction);
+    pushes[v] = push.dot(gradient[v]) / push.squaredNorm();
+  }
+  left_over = std::sqrt(left);
+  reaction = std::sqrt(held);
+}
+
+void Solver::fill_blocks() {
+  for (Matrix3& block : blocks.blocks) block.setZero();
+  for (std::size_t t = 0; t < elements.size(); ++t) {
+    const NeoHookeanElement& element = elements[t];
+    NeoHookeanElement::Vectors corners;
+    for (std::size_t i = 0; i < 4; ++i) corners[i] = x[at(element.vertices[i])];
+    for (std::size_t pair = 0; pair < corner_pairs.size(); ++pair) {
+      const auto [i, j] = corner_pairs[pair];
+      const bool lower = element.vertices[i] >= element.vertices[j];
+      blocks.blocks[at(blocks.elements[t][pair])] +=
+          lower ? element.block(corners, i, j) : element.block(corners, j, i);
+    }
+  }
+  // On a curved obstacle the push turns as its vertex slides.
+  for (const int vertex : surface) {
+    const std::size_t v = at(vertex);
+    if (touching[v] != 0) blocks.blocks[at(blocks.columns.first[v])] -= pushes[v] * points[v].turn;
+  }
+}
+
+/// The matrix in the vertices' frames. What is held has a row of its own that says how far it goes; the others feel
+/// that on the right-hand side.
+void Solver::fill_matrix(Eigen::VectorXd& right) {
+  double trace = 0.0;
+  for (int v = 0; v < count; ++v) trace += blocks.blocks[at(blocks.columns.first[at(v)])].trace();
+  const double diagonal = trace / (3.0 * count);
+  double* values = matrix.valuePtr();
+  const int* starts = matrix.outerIndexPtr();
+  for (int column = 0; column < count; ++column) {
+    const Hold& from = holds[at(column)];
+    int below = 0;  // rows of this column's blocks so far
+    for (const int* row = blocks.columns.begin(column); row != blocks.columns.end(column); ++row) {
+      const Hold& to = holds[at(*row)];
+      const Matrix3 local =
+          to.frame.transpose() * blocks.blocks[at(static_cast<int>(row - blocks.columns.items.data()))] * from.frame;
+      const bool own = *row == column;
+      for (int b = 0; b < 3; ++b) {
+        for (int a = own ? b : 0; a < 3; ++a) {
+          const bool a_held = to.held[at(a)];
+          const bool b_held = from.held[at(b)];
+          const int place = own ? starts[3 * column + b] + a - b : starts[3 * column + b] + below - b + a;
+          values[place] = a_held || b_held ? 0.0 : local(a, b);
+          if (own && a == b) {
+            if (a_held) {
+              values[place] = diagonal;
+              right[3 * column + a] = diagonal * from.way[a];
+            }
+            continue;
+          }
+          if (b_held && !a_held) right[3 * *row + a] -= local(a, b) * from.way[b];
+          if (a_held && !b_held) right[3 * column + b] -= local(a, b) * to.way[a];
+        }
+      }
+      below += 3;
+    }
+  }
+}
+
+/// Cholesky; where the matrix is not positive definite, with the smallest of ten-folding shifts of its diagonal.
+bool Solver::factorise(Eigen::VectorXd& right) {
+  fill_blocks();
+  fill_matrix(right);
+  const double mean = matrix.diagonal().sum() / static_cast<double>(matrix.rows());
+  double shift = 0.0;
+  for (int attempt = 0; attempt < 12; ++attempt) {
+    factor.setShift(shift);
+    factor.factorize(matrix);
+    if (factor.info() == Eigen::Success) return true;
+    shift = shift > 0.0 ? 10.0 * shift : 1e-6 * mean;
+  }
+  return false;
+}
+
+/// `part` of a step, with what is held where it belongs.
+Vectors Solver::moved(const Vectors& step, double part, double load) const {
+  Vectors result(x.size());
+  for (std::size_t v = 0; v < x.size(); ++v) {
+    result[v] = x[v] + part * step[v];
+    for (int axis = 0; axis < 3; ++axis) {
+      if (fixed[v][at(axis)]) result[v][axis] = problem.mesh.vertices[v][axis] + load * prescribed[v][axis];
+    }
+    if (touching[v] == 0) continue;
+    for (int pass = 0; pass < 8; ++pass) {
+      const ObstaclePoint point = obstacle_at(result[v], load);
+      const Vector3 push = along_free(static_cast<int>(v), point.direction);
+      if (!(push.norm() > grazing)) break;
+      result[v] += point.depth / push.squaredNorm() * push;
+      if (std::abs(point.depth) <= 0.01 * length_rounding * length) break;
+    }
+  }
+  return result;
+}
+
+bool Solver::settle(double load, double tolerance) {
+  std::fill(releases.begin(), releases.end(), 0);
+  Vectors gradient;
+  Vectors trial_gradient;
+  Vectors step(at(count));
+  Eigen::VectorXd right(3 * count);
+  double size = 0.0;
+  for (int iteration = 0;; ++iteration) {
+    changed = false;
+    const double energy = evaluate(x, load, gradient, size);
+    touch(load);
+    for (int v = 0; v < count; ++v) holds[at(v)] = hold(v, load);
+    measure(gradient);
+    let_go(load, gradient);
+    double way = 0.0;
+    for (std::size_t v = 0; v < at(count); ++v) {
+      for (int a = 0; a < 3; ++a) {
+        if (holds[v].held[at(a)]) way = std::max(way, std::abs(holds[v].way[a]));
+      }
+    }
+    const bool there = way <= length_rounding * length;
+    if (there && !changed && left_over <= tolerance * reaction) return true;
+    if (iteration == options.max_iterations || !std::isfinite(energy)) return false;
+
+    for (int v = 0; v < count; ++v) right.segment<3>(3 * v) = -(holds[at(v)].frame.transpose() * gradient[at(v)]);
+    if (!factorise(right)) return false;
+    const Eigen::VectorXd solved = factor.solve(right);
+    double slope = 0.0;
+    for (int v = 0; v < count; ++v) {
+      step[at(v)] = holds[at(v)].frame * solved.segment<3>(3 * v);
+      slope += gradient[at(v)].dot(step[at(v)]);
+    }
+    ++iterations;
+    // Where something has yet to go to its place the energy has to rise: such a step is taken whole.
+    Vectors trial = moved(step, 1.0, load);
+    double part = 1.0;
+    for (int halving = 0; there && halving < halvings; ++halving) {
+      double trial_size = 0.0;
+      const double trial_energy = evaluate(trial, load, trial_gradient, trial_size);
+      if (trial_energy <= energy + armijo * part * slope + energy_rounding * (size + trial_size)) break;
+      part *= 0.5;
+      trial = moved(step, part, load);
+    }
+    x = trial;
+  }
+}
+
+ReferenceSolution Solver::solve() {
+  ReferenceSolution result;
+  for (int step = 1; step <= options.load_steps; ++step) {
+    const double load = static_cast<double>(step) / options.load_steps;
+    const bool last = step == options.load_steps;
+    result.converged = settle(last ? 1.0 : load, last ? options.tolerance : std::max(loose, options.tolerance));
+  }
+  result.positions = x;
+  Vectors gradient;
+  double size = 0.0;
+  evaluate(x, 1.0, gradient, size);
+  for (std::size_t v = 0; v < at(count); ++v) {
+    result.internal_forces.push_back(-gradient[v] - forces[v]);
+    if (touching[v] == 0) continue;
+    result.contacts.push_back(static_cast<int>(v));
+    result.contact_force -= pushes[v] * points[v].direction;
+  }
+  result.iterations = iterations;
+  result.residual = reaction > 0.0 ? left_over / reaction : left_over;
+  return result;
+}
+
+}  // namespace
+
+Obstacle rigid_sphere(const Vector3& centre, double radius) {
+  return [centre, radius](const Vector3& point) {
+    const Vector3 out = point - centre;
+    const double distance = out.norm();
+    ObstaclePoint result;
+    result.depth = radius - distance;
+    if (!(distance > 0.0)) {
+      result.direction = Vector3::UnitZ();  // every way is the shortest
+      return result;
+    }
+    result.direction = out / distance;
+    result.turn = (Matrix3::Identity() - result.direction * result.direction.transpose()) / distance;
+    return result;
+  };
+}
+
+ReferenceSolution solve_statics(const ReferenceProblem& problem, const ReferenceOptions& options) {
+  return Solver(problem, options).solve();
+}
+
+}  // namespace tissue_sim
