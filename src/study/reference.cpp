@@ -1,5 +1,7 @@
 #include "tissue_sim/study/reference.h"
 
+#include <omp.h>
+
 #include <Eigen/CholmodSupport>
 #include <Eigen/SparseCore>
 #include <algorithm>
@@ -15,7 +17,7 @@ using Vectors = std::vector<Vector3>;
 using SparseMatrix = Eigen::SparseMatrix<double>;
 
 constexpr double armijo = 1e-4;            ///< 1, of the decrease that the slope promises
-constexpr double energy_rounding = 1e-14;  ///< 1, of the energies summed: below it a rise says nothing
+constexpr double energy_rounding = 1e-15;  ///< 1, of the shear modulus times volume: a smaller rise says nothing
 constexpr int halvings = 30;               ///< of a Newton step before it is taken as it is
 constexpr int free_changes = 4;            ///< a vertex that was let go more often waits until the others are at rest
 constexpr double length_rounding = 1e-12;  ///< 1, of the solid's size: nearer is there
@@ -88,6 +90,19 @@ struct Hold {
   Vector3 way{0, 0, 0};  ///< m, along the held ones
 };
 
+/// CHOLMOD starts threads for loops of a few microseconds, whatever the machine is busy with; on two busy cores that
+/// took longer than the work.
+class OneThread {
+ public:
+  OneThread() : before(omp_get_max_active_levels()) { omp_set_max_active_levels(0); }
+  ~OneThread() { omp_set_max_active_levels(before); }
+  OneThread(const OneThread&) = delete;
+  OneThread& operator=(const OneThread&) = delete;
+
+ private:
+  int before;
+};
+
 class Solver {
  public:
   Solver(const ReferenceProblem& given, const ReferenceOptions& given_options);
@@ -95,7 +110,7 @@ class Solver {
 
  private:
   bool settle(double load, double tolerance);
-  double evaluate(const Vectors& x, double load, Vectors& gradient, double& size) const;
+  double evaluate(const Vectors& positions, double load, Vectors& gradient) const;
   ObstaclePoint obstacle_at(const Vector3& x, double load) const;
   Vector3 along_free(int vertex, const Vector3& direction) const;
   Hold hold(int vertex, double load) const;
@@ -110,7 +125,8 @@ class Solver {
   const ReferenceProblem& problem;
   const ReferenceOptions& options;
   int count;
-  double length = 0.0;  ///< m, of the solid's box
+  double length = 0.0;    ///< m, of the solid's box
+  double rounding = 0.0;  ///< J, of the energy
   std::vector<NeoHookeanElement> elements;
   std::vector<std::array<bool, 3>> fixed;
   Vectors prescribed;
@@ -169,6 +185,7 @@ Solver::Solver(const ReferenceProblem& given, const ReferenceOptions& given_opti
     }
     elements.push_back(
         NeoHookeanElement::at_rest(tetrahedra[t], corners, problem.moduli[problem.moduli.size() == 1 ? 0 : t]));
+    rounding += energy_rounding * elements.back().volume * elements.back().moduli.mu;
     if (!(elements.back().volume > 0.0)) {
       throw std::invalid_argument("ReferenceProblem: tetrahedron " + std::to_string(t) + " has no volume");
     }
@@ -196,8 +213,8 @@ Solver::Solver(const ReferenceProblem& given, const ReferenceOptions& given_opti
   factor.analyzePattern(matrix);
 }
 
-/// Energy in J of the solid and its loads; its gradient in N; the size of what was summed, for the rounding.
-double Solver::evaluate(const Vectors& positions, double load, Vectors& gradient, double& size) const {
+/// Energy in J of the solid and its loads, and its gradient in N.
+double Solver::evaluate(const Vectors& positions, double load, Vectors& gradient) const {
   double energy = 0.0;
   gradient.assign(at(count), Vector3::Zero());
   for (const NeoHookeanElement& element : elements) {
@@ -207,11 +224,8 @@ double Solver::evaluate(const Vectors& positions, double load, Vectors& gradient
     energy += element.evaluate(corners, pull);
     for (std::size_t i = 0; i < 4; ++i) gradient[at(element.vertices[i])] += pull[i];
   }
-  size = std::abs(energy);
   for (std::size_t v = 0; v < at(count); ++v) {
-    const double work = load * forces[v].dot(positions[v] - problem.mesh.vertices[v]);
-    energy -= work;
-    size += std::abs(work);
+    energy -= load * forces[v].dot(positions[v] - problem.mesh.vertices[v]);
     gradient[v] -= load * forces[v];
   }
   return energy;
@@ -418,10 +432,9 @@ bool Solver::settle(double load, double tolerance) {
   Vectors trial_gradient;
   Vectors step(at(count));
   Eigen::VectorXd right(3 * count);
-  double size = 0.0;
   for (int iteration = 0;; ++iteration) {
     changed = false;
-    const double energy = evaluate(x, load, gradient, size);
+    const double energy = evaluate(x, load, gradient);
     touch(load);
     for (int v = 0; v < count; ++v) holds[at(v)] = hold(v, load);
     measure(gradient);
@@ -449,9 +462,8 @@ bool Solver::settle(double load, double tolerance) {
     Vectors trial = moved(step, 1.0, load);
     double part = 1.0;
     for (int halving = 0; there && halving < halvings; ++halving) {
-      double trial_size = 0.0;
-      const double trial_energy = evaluate(trial, load, trial_gradient, trial_size);
-      if (trial_energy <= energy + armijo * part * slope + energy_rounding * (size + trial_size)) break;
+      const double trial_energy = evaluate(trial, load, trial_gradient);
+      if (trial_energy <= energy + armijo * part * slope + rounding) break;
       part *= 0.5;
       trial = moved(step, part, load);
     }
@@ -468,8 +480,7 @@ ReferenceSolution Solver::solve() {
   }
   result.positions = x;
   Vectors gradient;
-  double size = 0.0;
-  evaluate(x, 1.0, gradient, size);
+  evaluate(x, 1.0, gradient);
   for (std::size_t v = 0; v < at(count); ++v) {
     result.internal_forces.push_back(-gradient[v] - forces[v]);
     if (touching[v] == 0) continue;
@@ -500,6 +511,7 @@ Obstacle rigid_sphere(const Vector3& centre, double radius) {
 }
 
 ReferenceSolution solve_statics(const ReferenceProblem& problem, const ReferenceOptions& options) {
+  const OneThread one_thread;
   return Solver(problem, options).solve();
 }
 
