@@ -21,6 +21,7 @@ constexpr double energy_rounding = 1e-15;  ///< 1, of the shear modulus times vo
 constexpr int halvings = 30;               ///< of a Newton step before it is taken as it is
 constexpr int free_changes = 4;            ///< a vertex that was let go more often waits until the others are at rest
 constexpr double length_rounding = 1e-12;  ///< 1, of the solid's size: nearer is there
+constexpr int patience = 10;               ///< iterations without getting nearer, as where rounding is reached
 constexpr double loose = 1e-3;             ///< 1, tolerance of the load steps before the last
 constexpr double grazing = 0.1;            ///< 1, of a contact's direction along the free axes; less can push nothing
 
@@ -139,7 +140,7 @@ class Solver {
   Vectors x;
   std::vector<Hold> holds;
   std::vector<char> touching;
-  std::vector<int> releases;
+  std::vector<int> releases;          ///< of a vertex, in this load step
   std::vector<ObstaclePoint> points;  ///< of the touching vertices
   std::vector<double> pushes;         ///< N, of the obstacle on them
   bool changed = false;               ///< the active set, in this iteration
@@ -298,7 +299,8 @@ void Solver::let_go(double load, const Vectors& gradient) {
   int worst = -1;
   for (const int vertex : surface) {
     const std::size_t v = at(vertex);
-    if (touching[v] == 0 || !(pushes[v] < -slack)) continue;
+    const bool there = points[v].depth <= length_rounding * length;  // before that its push says nothing
+    if (touching[v] == 0 || !there || !(pushes[v] < -slack)) continue;
     if (releases[v] < free_changes) {
       ++releases[v];
       touching[v] = 0;
@@ -432,6 +434,8 @@ bool Solver::settle(double load, double tolerance) {
   Vectors trial_gradient;
   Vectors step(at(count));
   Eigen::VectorXd right(3 * count);
+  double least = 0.0;  // N, left over since the active set last changed
+  int idle = 0;        // iterations since then that did not halve it
   for (int iteration = 0;; ++iteration) {
     changed = false;
     const double energy = evaluate(x, load, gradient);
@@ -447,6 +451,12 @@ bool Solver::settle(double load, double tolerance) {
     }
     const bool there = way <= length_rounding * length;
     if (there && !changed && left_over <= tolerance * reaction) return true;
+    if (changed || !there || left_over < 0.5 * least) {
+      least = left_over;
+      idle = 0;
+    } else if (++idle == patience) {
+      return false;
+    }
     if (iteration == options.max_iterations || !std::isfinite(energy)) return false;
 
     for (int v = 0; v < count; ++v) right.segment<3>(3 * v) = -(holds[at(v)].frame.transpose() * gradient[at(v)]);
@@ -506,6 +516,16 @@ Obstacle rigid_sphere(const Vector3& centre, double radius) {
     }
     result.direction = out / distance;
     result.turn = (Matrix3::Identity() - result.direction * result.direction.transpose()) / distance;
+    return result;
+  };
+}
+
+Obstacle rigid_surface(const InstrumentSurface& surface, const Pose& pose) {
+  return [&surface, pose](const Vector3& point) {
+    const ClosestFeature feature = closest_feature(surface, pose.apply_inverse(point));
+    ObstaclePoint result;
+    result.depth = feature.depth;
+    result.direction = pose.orientation * feature.direction;
     return result;
   };
 }

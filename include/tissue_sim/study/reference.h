@@ -4,6 +4,8 @@
 #include <functional>
 #include <vector>
 
+#include "tissue_sim/contact/instrument_surface.h"
+#include "tissue_sim/geometry/pose.h"
 #include "tissue_sim/geometry/tetrahedral_mesh.h"
 #include "tissue_sim/tissue/neo_hookean.h"
 
@@ -18,6 +20,9 @@ struct ObstaclePoint {
 using Obstacle = std::function<ObstaclePoint(const Vector3&)>;
 
 Obstacle rigid_sphere(const Vector3& centre, double radius);
+
+/// Depth and direction of closest_feature(), each triangle flat. Keeps a reference to `surface`.
+Obstacle rigid_surface(const InstrumentSurface& surface, const Pose& pose);
 
 /// A solid at rest under dead loads, held vertices and a rigid, frictionless obstacle that no vertex of `surface` may
 /// be inside of. Lists of vectors may be empty: all zero, none held.
