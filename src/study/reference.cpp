@@ -21,6 +21,7 @@ constexpr double energy_rounding = 1e-15;  ///< 1, of the shear modulus times vo
 constexpr int halvings = 30;               ///< of a Newton step before it is taken as it is
 constexpr int free_changes = 4;            ///< a vertex that was let go more often waits until the others are at rest
 constexpr double length_rounding = 1e-12;  ///< 1, of the solid's size: nearer is there
+constexpr double least_reaction = 1e-8;    ///< 1, of the shear modulus times the square of the solid's size
 constexpr int patience = 10;               ///< iterations without getting nearer, as where rounding is reached
 constexpr double loose = 1e-3;             ///< 1, tolerance of the load steps before the last
 constexpr double grazing = 0.1;            ///< 1, of a contact's direction along the free axes; less can push nothing
@@ -128,6 +129,7 @@ class Solver {
   int count;
   double length = 0.0;    ///< m, of the solid's box
   double rounding = 0.0;  ///< J, of the energy
+  double faintest = 0.0;  ///< N, the least reaction
   std::vector<NeoHookeanElement> elements;
   std::vector<std::array<bool, 3>> fixed;
   Vectors prescribed;
@@ -170,6 +172,7 @@ Solver::Solver(const ReferenceProblem& given, const ReferenceOptions& given_opti
   check_size(problem.prescribed.size(), n, "prescribed");
   check_size(problem.forces.size(), n, "forces");
   check_size(options.start.size(), n, "start");
+  if (options.load_steps < 1) throw std::invalid_argument("ReferenceOptions: load_steps: expected 1 or more");
   fixed = problem.fixed;
   fixed.resize(n);
   prescribed = problem.prescribed;
@@ -197,8 +200,15 @@ Solver::Solver(const ReferenceProblem& given, const ReferenceOptions& given_opti
     box.extend(problem.mesh.vertices[v]);
   }
   length = box.isEmpty() ? 0.0 : box.diagonal().norm();
+  for (const NeoHookeanElement& element : elements) {
+    faintest = std::max(faintest, least_reaction * element.moduli.mu * length * length);
+  }
   if (problem.obstacle) {
     for (const int v : problem.surface) {
+      if (v < 0 || v >= count) {
+        throw std::invalid_argument("ReferenceProblem: surface names vertex " + std::to_string(v) + " of " +
+                                    std::to_string(count));
+      }
       if (!(fixed[at(v)][0] && fixed[at(v)][1] && fixed[at(v)][2])) surface.push_back(v);
     }
   }
@@ -332,7 +342,7 @@ void Solver::measure(const Vectors& gradient) {
     pushes[v] = push.dot(gradient[v]) / push.squaredNorm();
   }
   left_over = std::sqrt(left);
-  reaction = std::sqrt(held);
+  reaction = std::max(std::sqrt(held), faintest);
 }
 
 void Solver::fill_blocks() {
@@ -498,7 +508,7 @@ ReferenceSolution Solver::solve() {
     result.contact_force -= pushes[v] * points[v].direction;
   }
   result.iterations = iterations;
-  result.residual = reaction > 0.0 ? left_over / reaction : left_over;
+  result.residual = left_over / reaction;
   return result;
 }
 

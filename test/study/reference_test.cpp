@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <stdexcept>
 
 namespace tissue_sim {
 namespace {
@@ -19,7 +20,7 @@ std::vector<double> even_planes(double from, double to, int cells) {
 }
 
 ReferenceProblem solid_problem(const TetrahedralMesh& mesh, double poisson) {
-  ReferenceProblem problem{mesh, {lame_moduli(young, poisson)}, {}, {}, {}, {}, Vector3::Zero(), {}};
+  ReferenceProblem problem{mesh, {lame_moduli(young, poisson)}};
   problem.fixed.resize(mesh.vertices.size());
   problem.prescribed.assign(mesh.vertices.size(), Vector3::Zero());
   problem.forces.assign(mesh.vertices.size(), Vector3::Zero());
@@ -125,6 +126,45 @@ TEST(Reference, AFlatPlateIsAGuidedEnd) {
   for (const int v : solution.contacts) force += expected.internal_forces[static_cast<std::size_t>(v)].z();
   EXPECT_GT(force, 0.1);
   EXPECT_NEAR(solution.contact_force.z(), force, 1e-6 * force);
+}
+
+TEST(Reference, NothingMovesWithoutALoad) {
+  const Bar bar(0.0);
+  const ReferenceSolution solution = solve_statics(bar.problem);
+  EXPECT_TRUE(solution.converged);
+  EXPECT_EQ(solution.iterations, 0);
+  EXPECT_EQ(solution.positions, bar.mesh.vertices);
+}
+
+TEST(Reference, WhatNothingHoldsHasNoEquilibrium) {
+  const TetrahedralMesh mesh = make_block({0.01, 0.01, 0.01}, {2, 2, 2});
+  ReferenceProblem problem = solid_problem(mesh, 0.3);
+  for (Vector3& force : problem.forces) force.x() = 0.001;
+  const ReferenceSolution solution = solve_statics(problem);
+  EXPECT_FALSE(solution.converged);
+  EXPECT_GT(solution.residual, 1e-3);
+}
+
+TEST(Reference, ListsThatDoNotFitTheMeshAreRefused) {
+  TetrahedralMesh mesh = make_block({0.01, 0.01, 0.01}, {1, 1, 1});
+  const auto refused = [&](auto change) {
+    ReferenceProblem problem = solid_problem(mesh, 0.3);
+    ReferenceOptions options;
+    change(problem, options);
+    EXPECT_THROW(solve_statics(problem, options), std::invalid_argument);
+  };
+  refused([](ReferenceProblem& problem, ReferenceOptions&) { problem.fixed.pop_back(); });
+  refused([](ReferenceProblem& problem, ReferenceOptions&) { problem.prescribed.pop_back(); });
+  refused([](ReferenceProblem& problem, ReferenceOptions&) { problem.forces.pop_back(); });
+  refused([](ReferenceProblem& problem, ReferenceOptions&) { problem.moduli.resize(2); });
+  refused([](ReferenceProblem&, ReferenceOptions& options) { options.start.resize(3); });
+  refused([](ReferenceProblem&, ReferenceOptions& options) { options.load_steps = 0; });
+  refused([](ReferenceProblem& problem, ReferenceOptions&) {
+    problem.obstacle = rigid_sphere({0, 0, 1}, 0.1);
+    problem.surface = {8};
+  });
+  std::swap(mesh.tetrahedra[0][0], mesh.tetrahedra[0][1]);
+  refused([](ReferenceProblem&, ReferenceOptions&) {});
 }
 
 /// Tip deflection over Timoshenko's, of a cantilever of length 8 h, height h and width h / 2 with `cells` through its

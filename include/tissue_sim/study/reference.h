@@ -28,20 +28,20 @@ Obstacle rigid_surface(const InstrumentSurface& surface, const Pose& pose);
 /// be inside of. Lists of vectors may be empty: all zero, none held.
 struct ReferenceProblem {
   const TetrahedralMesh& mesh;
-  std::vector<LameModuli> moduli;          ///< one for all, or one a tetrahedron
-  std::vector<std::array<bool, 3>> fixed;  ///< a vertex, along x, y and z
-  std::vector<Vector3> prescribed;         ///< m a vertex: its displacement along the axes in which it is fixed
-  std::vector<Vector3> forces;             ///< N a vertex
-  Obstacle obstacle;                       ///< may be empty
-  Vector3 approach{0, 0, 0};               ///< m, how far the obstacle has come; it comes in the load steps
-  std::vector<int> surface;                ///< the vertices that may touch the obstacle
+  std::vector<LameModuli> moduli;            ///< one for all, or one a tetrahedron
+  std::vector<std::array<bool, 3>> fixed{};  ///< a vertex, along x, y and z
+  std::vector<Vector3> prescribed{};         ///< m a vertex: its displacement along the axes in which it is fixed
+  std::vector<Vector3> forces{};             ///< N a vertex
+  Obstacle obstacle{};                       ///< may be empty
+  Vector3 approach{0, 0, 0};                 ///< m, how far the obstacle has come; it comes in the load steps
+  std::vector<int> surface{};                ///< the vertices that may touch the obstacle
 };
 
 struct ReferenceOptions {
-  double tolerance = 1e-7;     ///< of the residual to the reaction
-  int load_steps = 1;          ///< displacements, forces and the obstacle's approach grow in as many equal steps
-  int max_iterations = 60;     ///< of Newton in a load step
-  std::vector<Vector3> start;  ///< m, positions to begin with; empty: at rest
+  double tolerance = 1e-7;       ///< of the residual to the reaction
+  int load_steps = 1;            ///< displacements, forces and the obstacle's approach grow in as many equal steps
+  int max_iterations = 60;       ///< of Newton in a load step
+  std::vector<Vector3> start{};  ///< m, positions to begin with; empty: at rest
 };
 
 struct ReferenceSolution {
