@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -199,6 +200,20 @@ TEST(NeoHookeanBatch, SameBitsWhateverThePadding) {
       add_neo_hookean_forces(pack({block.elements[n]}), u.data(), one_by_one.data(), set);
     }
   }
+}
+
+/// Products of these displacements are below what a float holds in full; what is linear in them is not.
+TEST(NeoHookeanBatch, TinyStrainsKeepTheirLinearPartAndTheCallerKeepsItsRounding) {
+  Block block(2);
+  const std::vector<float> u = block.displacements(1e-20);
+  std::vector<float> larger = u;
+  for (float& value : larger) value *= 1024.0f * 1024.0f;
+  const std::vector<float> forces = block.forces(u);
+  const std::vector<float> larger_forces = block.forces(larger);
+  for (std::size_t i = 0; i < u.size(); ++i) EXPECT_EQ(forces[i] * 1024.0f * 1024.0f, larger_forces[i]);
+  EXPECT_NE(forces[0], 0.0f);
+  volatile float smallest = std::numeric_limits<float>::min();
+  EXPECT_GT(smallest / 4.0f, 0.0f);
 }
 
 TEST(NeoHookeanBatch, FourthComponentIsNeitherReadNorChanged) {
