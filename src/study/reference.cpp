@@ -24,6 +24,7 @@ constexpr double length_rounding = 1e-12;  ///< 1, of the solid's size: nearer i
 constexpr double least_reaction = 1e-8;    ///< 1, of the shear modulus times the square of the solid's size
 constexpr int patience = 10;               ///< iterations without getting nearer, as where rounding is reached
 constexpr double loose = 1e-3;             ///< 1, tolerance of the load steps before the last
+constexpr double near = 1e-3;              ///< 1, of the solid's size: so near to the obstacle a start touches it
 constexpr double grazing = 0.1;            ///< 1, of a contact's direction along the free axes; less can push nothing
 
 /// The lower triangle of a symmetric matrix of 3 x 3 blocks, a block for every two vertices that share a tetrahedron.
@@ -41,8 +42,8 @@ BlockMatrix build_blocks(int vertex_count, const std::vector<Tetrahedron>& tetra
   for (int v = 0; v < vertex_count; ++v) columns[static_cast<std::size_t>(v)].push_back(v);
   for (const Tetrahedron& corners : tetrahedra) {
     for (const auto& [i, j] : corner_pairs) {
-      if (i != j)
-        columns[static_cast<std::size_t>(std::min(corners[i], corners[j]))].push_back(std::max(corners[i], corners[j]));
+      if (i == j) continue;
+      columns[static_cast<std::size_t>(std::min(corners[i], corners[j]))].push_back(std::max(corners[i], corners[j]));
     }
   }
   BlockMatrix result;
@@ -493,6 +494,13 @@ bool Solver::settle(double load, double tolerance) {
 
 ReferenceSolution Solver::solve() {
   ReferenceSolution result;
+  if (!options.start.empty()) {
+    for (const int vertex : surface) {
+      const ObstaclePoint point = obstacle_at(x[at(vertex)], 1.0 / options.load_steps);
+      const bool pushable = along_free(vertex, point.direction).norm() > grazing;
+      if (pushable && point.depth > -near * length) touching[at(vertex)] = 1;
+    }
+  }
   for (int step = 1; step <= options.load_steps; ++step) {
     const double load = static_cast<double>(step) / options.load_steps;
     const bool last = step == options.load_steps;

@@ -37,6 +37,10 @@ struct ReferenceProblem {
   std::vector<int> surface{};                ///< the vertices that may touch the obstacle
 };
 
+/// An obstacle should come by less than half its thickness in a load step, or vertices leave it on its far side.
+/// Positions to start with choose among several equilibria, which a facetted obstacle has (vertices on either side of
+/// its edges; 0.1 % of the force with a sphere of 32 slices): what is on the obstacle, or within a thousandth of the
+/// solid's size of it, begins in contact.
 struct ReferenceOptions {
   double tolerance = 1e-7;       ///< of the residual to the reaction
   int load_steps = 1;            ///< displacements, forces and the obstacle's approach grow in as many equal steps
@@ -49,7 +53,7 @@ struct ReferenceSolution {
   std::vector<Vector3> internal_forces;  ///< N, the solid's own on every vertex
   std::vector<int> contacts;             ///< vertices on the obstacle, ascending
   Vector3 contact_force{0, 0, 0};        ///< N, on the obstacle
-  int iterations = 0;                    ///< of Newton, each with one factorisation
+  int iterations = 0;                    ///< of Newton, in all load steps
   double residual = 0.0;                 ///< 2-norm of the forces left over, a part of that of the reactions
   bool converged = false;  ///< residual within tolerance, no vertex inside the obstacle, none pulled to it
 };
@@ -57,7 +61,9 @@ struct ReferenceSolution {
 /// Static equilibrium of stable neo-Hookean tetrahedra: Newton with the exact second derivative, Armijo line search on
 /// the energy and a sparse Cholesky factorisation. Contact is an active set: a vertex in contact stays on the
 /// obstacle's surface (its closest point, so that curvature is exact) and slides along it; it is let go when it is
-/// pulled. Same input, same bits. Throws std::invalid_argument when the problem's lists do not fit the mesh.
+/// pulled. Reactions so small that rounding would decide (1e-8 of the shear modulus times the square of the solid's
+/// size) count as that much. Same input, same bits. Throws std::invalid_argument when the problem's lists do not fit
+/// the mesh.
 ReferenceSolution solve_statics(const ReferenceProblem& problem, const ReferenceOptions& options = {});
 
 }  // namespace tissue_sim
