@@ -15,15 +15,16 @@ namespace {
 
 using Vectors = NeoHookeanElement::Vectors;
 
-constexpr double kEdge = 0.002;     // m
-constexpr double kRounding = 6e-8;  // 2^-24, what one operation in float may be off by
+constexpr double edge_length = 0.002;  // m
+constexpr double rounding = 6e-8;      // 2^-24, what one operation in float may be off by
 
 /// A block of cells of six tetrahedra around the diagonal, its vertices moved by up to a tenth of the edge.
 struct Block {
   explicit Block(int n, double poisson = 0.45) {
     for (int k = 0; k <= n; ++k) {
       for (int j = 0; j <= n; ++j) {
-        for (int i = 0; i <= n; ++i) rest.push_back(kEdge * Vector3(i, j, k) + random_point(random, 0.1 * kEdge));
+        for (int i = 0; i <= n; ++i)
+          rest.push_back(edge_length * Vector3(i, j, k) + random_point(random, 0.1 * edge_length));
       }
     }
     const int orders[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {1, 0, 2}, {2, 1, 0}};
@@ -54,7 +55,7 @@ struct Block {
     h << random_point(random, strain), random_point(random, strain), random_point(random, strain);
     std::vector<float> result;
     for (const Vector3& x : rest) {
-      const Vector3 u = h * x + random_point(random, 0.5 * strain * kEdge);
+      const Vector3 u = h * x + random_point(random, 0.5 * strain * edge_length);
       for (int a = 0; a < 3; ++a) result.push_back(static_cast<float>(u[a]));
       result.push_back(0.0f);
     }
@@ -119,7 +120,7 @@ TEST(NeoHookeanBatch, AgreesWithThePlainElement) {
         for (std::size_t c = 0; c < 4; ++c) {
           const auto v = static_cast<std::size_t>(element.vertices[c]);
           expected[v] -= gradient[c];
-          tolerance[v] += 40.0 * kRounding * magnitude(element, moved);
+          tolerance[v] += 40.0 * rounding * magnitude(element, moved);
         }
       }
       const std::vector<float> forces = block.forces(u);

@@ -12,7 +12,7 @@ namespace {
 
 using Vectors = NeoHookeanElement::Vectors;
 
-constexpr double kEdge = 0.004;  // m
+constexpr double edge_length = 0.004;  // m
 
 class NeoHookean : public testing::Test {
  protected:
@@ -25,13 +25,14 @@ class NeoHookean : public testing::Test {
   Matrix3 random_rotation() { return random_pose(random, 0.0).orientation.toRotationMatrix(); }
   /// A corner of a cube, each vertex moved by at most a fifth of the edge.
   Vectors random_rest() {
-    return {random_vector(0.2 * kEdge), kEdge * Vector3::UnitX() + random_vector(0.2 * kEdge),
-            kEdge * Vector3::UnitY() + random_vector(0.2 * kEdge),
-            kEdge * Vector3::UnitZ() + random_vector(0.2 * kEdge)};
+    return {random_vector(0.2 * edge_length), edge_length * Vector3::UnitX() + random_vector(0.2 * edge_length),
+            edge_length * Vector3::UnitY() + random_vector(0.2 * edge_length),
+            edge_length * Vector3::UnitZ() + random_vector(0.2 * edge_length)};
   }
   /// Anything, inverted about half the time.
   Vectors random_state() {
-    return {random_vector(kEdge), random_vector(kEdge), random_vector(kEdge), random_vector(kEdge)};
+    return {random_vector(edge_length), random_vector(edge_length), random_vector(edge_length),
+            random_vector(edge_length)};
   }
 
   const LameModuli liver = lame_moduli(5400.0, 0.45);
@@ -107,7 +108,7 @@ TEST_F(NeoHookean, GradientIsTheDerivativeOfTheEnergy) {
     const double scale = largest(gradient);
     for (std::size_t i = 0; i < 4; ++i) {
       for (int a = 0; a < 3; ++a) {
-        const double h = 1e-5 * kEdge;
+        const double h = 1e-5 * edge_length;
         const double middle = x[i][a];
         x[i][a] = middle + h;
         const double above = element.evaluate(x, ignored);
@@ -128,7 +129,7 @@ TEST_F(NeoHookean, BlocksAreTheDerivativeOfTheGradient) {
     for (std::size_t j = 0; j < 4; ++j) {
       std::array<Matrix3, 4> differences;
       for (int a = 0; a < 3; ++a) {
-        const double h = 1e-5 * kEdge;
+        const double h = 1e-5 * edge_length;
         const double middle = x[j][a];
         Vectors above;
         Vectors below;
@@ -152,7 +153,7 @@ TEST_F(NeoHookean, RestCostsNothing) {
     const auto element = NeoHookeanElement::at_rest({0, 1, 2, 3}, rest, liver);
     Vectors gradient;
     EXPECT_NEAR(element.evaluate(rest, gradient), 0.0, 1e-12 * element.volume * liver.lambda);
-    EXPECT_LT(largest(gradient), 1e-12 * liver.lambda * kEdge * kEdge);
+    EXPECT_LT(largest(gradient), 1e-12 * liver.lambda * edge_length * edge_length);
   }
 }
 
@@ -163,7 +164,7 @@ TEST_F(NeoHookean, RigidMotionCostsNothingAndMakesNoForce) {
     Vectors gradient;
     EXPECT_NEAR(element.evaluate(moved(rest, random_rotation(), random_vector(0.01)), gradient), 0.0,
                 1e-12 * element.volume * liver.lambda);
-    EXPECT_LT(largest(gradient), 1e-12 * liver.lambda * kEdge * kEdge);
+    EXPECT_LT(largest(gradient), 1e-12 * liver.lambda * edge_length * edge_length);
   }
 }
 
@@ -223,7 +224,7 @@ TEST_F(NeoHookean, ForcesAndTorquesSumToZero) {
       torque += x[i].cross(gradient[i]);
     }
     EXPECT_LT(force.norm(), 1e-13 * largest(gradient));
-    EXPECT_LT(torque.norm(), 1e-12 * kEdge * largest(gradient));
+    EXPECT_LT(torque.norm(), 1e-12 * edge_length * largest(gradient));
   }
 }
 
