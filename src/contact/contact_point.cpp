@@ -29,8 +29,8 @@ ContactPoint contact_at(const OrganSurface& organ, int piece, int triangle, cons
   ContactPoint point;
   point.piece = piece;
   point.triangle = triangle;
-  point.vertices = organ.triangles[triangle];
   point.weights = weights;
+  for (int i = 0; i < 3; ++i) point.bearers.add(organ.triangles[triangle][i], weights[i]);
   point.direction = direction;
   point.target = direction.dot(place);
   return point;
@@ -45,6 +45,31 @@ ContactPoint vertex_contact(const OrganSurface& organ, int piece, int vertex, co
 }
 
 }  // namespace
+
+void Bearers::add(int vertex, double weight) {
+  if (weight == 0.0) return;
+  for (int i = 0; i < count; ++i) {
+    if (vertices[i] != vertex) continue;
+    weights[i] += weight;
+    return;
+  }
+  vertices[count] = vertex;
+  weights[count] = weight;
+  ++count;
+}
+
+void bear_by(const Embedding& embedding, const std::vector<Triangle>& triangles, std::vector<ContactPoint>& points) {
+  for (ContactPoint& point : points) {
+    point.bearers.count = 0;
+    for (int corner = 0; corner < 3; ++corner) {
+      const int vertex = triangles[point.triangle][corner];
+      if (point.weights[corner] == 0.0) continue;
+      for (int i = 0; i < 4; ++i) {
+        point.bearers.add(embedding.corners[vertex][i], point.weights[corner] * embedding.weights[vertex][i]);
+      }
+    }
+  }
+}
 
 void add_vertex_contacts(const OrganSurface& organ, const InstrumentSurface& instrument, int piece, const Pose& pose,
                          const Penetration& penetration, Detection& detection, std::vector<int>& touching,

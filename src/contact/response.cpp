@@ -10,6 +10,10 @@ namespace {
 /// Points that share vertices disturb each other; this many rounds leave less than the contact margin.
 constexpr int rounds = 8;
 
+/// Forces are shown, and nothing else depends on them: they may take longer, and stop where nothing changes any more.
+constexpr int rounds_for_forces = 200;
+constexpr double force_tolerance = 1e-6;
+
 /// sum w_i^2 / m_i: how easily the point moves. 0 where all its vertices are attached. Bounded from below so that no
 /// vertex goes more than twice as far as the point is asked to: one free corner with a small weight beside two attached
 /// ones would be thrown.
@@ -21,9 +25,9 @@ struct Mobility {
 Mobility mobility(const ContactPoint& point, const std::vector<double>& inverse_mass) {
   double sum = 0.0;
   double most = 0.0;
-  for (int i = 0; i < 3; ++i) {
-    const double share = point.weights[i] * inverse_mass[point.vertices[i]];
-    sum += point.weights[i] * share;
+  for (int i = 0; i < point.bearers.count; ++i) {
+    const double share = point.bearers.weights[i] * inverse_mass[point.bearers.vertices[i]];
+    sum += point.bearers.weights[i] * share;
     most = std::max(most, share);
   }
   return {std::max(sum, 0.5 * most), sum < 0.5 * most};
@@ -41,13 +45,13 @@ double push_out(const std::vector<ContactPoint>& points, const std::vector<doubl
       const auto [ease, bounded] = mobility(point, inverse_mass);
       if (!(behind > 0.0) || !(ease > 0.0)) continue;
       if (bounded && round > 0) continue;  // eight rounds would throw the vertex after all, 16 times as far
-      for (int i = 0; i < 3; ++i) {
-        const int vertex = point.vertices[i];
-        const double way = behind * point.weights[i] * inverse_mass[vertex] / ease;
-        if (!(way > 0.0)) continue;
+      for (int i = 0; i < point.bearers.count; ++i) {
+        const int vertex = point.bearers.vertices[i];
+        const double way = behind * point.bearers.weights[i] * inverse_mass[vertex] / ease;
+        if (way == 0.0) continue;
         positions[vertex] += way * point.direction;
         if (held) (*held)[vertex] = 1;
-        farthest_of_round = std::max(farthest_of_round, way);
+        farthest_of_round = std::max(farthest_of_round, std::abs(way));
       }
     }
     farthest += farthest_of_round;
@@ -56,22 +60,57 @@ double push_out(const std::vector<ContactPoint>& points, const std::vector<doubl
   return farthest;
 }
 
-void stop_at_instrument(std::vector<ContactPoint>& points, const std::vector<double>& inverse_mass,
-                        std::vector<Vector3>& velocities) {
-  for (ContactPoint& point : points) point.impulse = 0.0;
-  for (int round = 0; round < rounds; ++round) {
+namespace {
+
+/// Gives the points non-negative impulses (in `given`) so that none approaches its instrument: Gauss-Seidel over the
+/// points in order until the largest change is below `tolerance` of the largest impulse. `instrument(point)` is the
+/// velocity of the instrument there, or its acceleration where those are what is stopped.
+template <class Instrument>
+void stop(std::vector<ContactPoint>& points, const std::vector<double>& inverse_mass, double ContactPoint::*given,
+          int most_rounds, double tolerance, Instrument instrument, std::vector<Vector3>& velocities) {
+  for (ContactPoint& point : points) point.*given = 0.0;
+  for (int round = 0; round < most_rounds; ++round) {
+    double largest_change = 0.0;
+    double largest = 0.0;
     for (ContactPoint& point : points) {
       const double ease = mobility(point, inverse_mass).ease;
       if (!(ease > 0.0)) continue;
-      const double approach = point.direction.dot(point.instrument_velocity - at_point(point, velocities));
-      const double impulse = std::max(0.0, point.impulse + approach / ease);
-      const Vector3 change = (impulse - point.impulse) * point.direction;
-      for (int i = 0; i < 3; ++i) {
-        velocities[point.vertices[i]] += point.weights[i] * inverse_mass[point.vertices[i]] * change;
+      const double approach = point.direction.dot(instrument(point) - at_point(point, velocities));
+      const double impulse = std::max(0.0, point.*given + approach / ease);
+      const double change = impulse - point.*given;
+      for (int i = 0; i < point.bearers.count; ++i) {
+        const int vertex = point.bearers.vertices[i];
+        velocities[vertex] += point.bearers.weights[i] * inverse_mass[vertex] * (change * point.direction);
       }
-      point.impulse = impulse;
+      point.*given = impulse;
+      largest_change = std::max(largest_change, std::abs(change));
+      largest = std::max(largest, impulse);
+    }
+    if (!(largest_change > tolerance * largest)) break;
+  }
+}
+
+}  // namespace
+
+void stop_at_instrument(std::vector<ContactPoint>& points, const std::vector<double>& inverse_mass,
+                        const std::vector<Vector3>& positions, double dt, std::vector<Vector3>& velocities) {
+  const auto moving = [&](const ContactPoint& point) -> Vector3 {
+    const double ahead = std::max(0.0, point.direction.dot(at_point(point, positions)) - point.target);
+    return point.instrument_velocity - ahead / dt * point.direction;
+  };
+  stop(points, inverse_mass, &ContactPoint::impulse, rounds, 0.0, moving, velocities);
+}
+
+void bear_forces(const std::vector<double>& inverse_mass, const std::vector<Vector3>& forces,
+                 std::vector<Vector3>& accelerations, std::vector<ContactPoint>& points) {
+  for (const ContactPoint& point : points) {
+    for (int i = 0; i < point.bearers.count; ++i) {
+      const int vertex = point.bearers.vertices[i];
+      accelerations[vertex] = inverse_mass[vertex] * forces[vertex];
     }
   }
+  const auto still = [](const ContactPoint&) -> Vector3 { return Vector3::Zero(); };
+  stop(points, inverse_mass, &ContactPoint::force, rounds_for_forces, force_tolerance, still, accelerations);
 }
 
 }  // namespace tissue_sim

@@ -69,7 +69,7 @@ visualization_msgs::Marker marker(const std_msgs::Header& header, const std::str
 
 /// How bright each vertex is. rviz does not light triangles with colours of their own, and without shading a dent
 /// cannot be seen: so the light is put into the colours.
-std::vector<float> brightness(const TriangleMesh& mesh, const std::vector<Vector3>& positions) {
+std::vector<float> brightness(const TriangleMesh& mesh, const Span<Vector3>& positions) {
   const auto at = [&](int vertex) -> const Vector3& { return positions[static_cast<std::size_t>(vertex)]; };
   std::vector<Vector3> normals(positions.size(), Vector3::Zero());
   for (const Triangle& triangle : mesh.triangles) {

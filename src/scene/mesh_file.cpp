@@ -137,7 +137,7 @@ MeshFaults mend(const std::string& path, TriangleMesh& mesh, std::vector<std::st
   warn(joined, "closed " + count(joined, "boundary edge") + " by joining vertices closer than 1e-8 m");
   if (faults.degenerate_triangles > 0) {
     const int flat = drop_triangles(mesh, [&](const Triangle& t) {
-      return inspect({{mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]}, {{0, 1, 2}}})
+      return inspect(TriangleMesh{{mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]}, {{0, 1, 2}}})
                  .degenerate_triangles > 0;
     });
     warn(flat, "dropped " + count(flat, "triangle") + " without area");

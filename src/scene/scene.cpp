@@ -24,4 +24,16 @@ const char* to_string(DepthScheme depth) {
   return depth == DepthScheme::exact ? "exact" : "paper";
 }
 
+const char* to_string(Integrator integrator) {
+  switch (integrator) {
+    case Integrator::automatic:
+      return "auto";
+    case Integrator::explicit_substeps:
+      return "explicit";
+    case Integrator::vertex_block_descent:
+      return "vertex_block_descent";
+  }
+  return "?";
+}
+
 }  // namespace tissue_sim

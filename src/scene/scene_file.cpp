@@ -10,9 +10,11 @@
 #include <set>
 #include <sstream>
 
+#include "tissue_sim/geometry/embedding.h"
 #include "tissue_sim/scene/instrument_file.h"
 #include "tissue_sim/scene/mesh_file.h"
 #include "tissue_sim/scene/resource_path.h"
+#include "tissue_sim/scene/tetrahedral_mesh_file.h"
 #include "yaml_mapping.h"
 
 namespace tissue_sim {
@@ -28,6 +30,12 @@ constexpr double size_ratio_limit = 1000.0;
 
 /// The wall's distance and area energies reach no smaller Poisson's ratio.
 constexpr double smallest_wall_poisson = 1.0 / 3.0;
+
+/// Distance and volume energies of a solid reach no smaller one.
+constexpr double smallest_volume_poisson = 0.25;
+
+/// Of the surface's mean edge: how far a surface may stand out of the solid that is to carry it.
+constexpr double farthest_outside = 3.0;
 
 bool above_zero(double x) {
   return x > 0.0;
@@ -93,24 +101,37 @@ Pose read_organ_pose(const YamlMapping& organ, const Frames& frames, const std::
 }
 
 Model read_model(const YamlMapping& organ) {
-  const Model model = organ.choice<Model>("model", {{"contact_only", Model::contact_only},
-                                                    {"surface", Model::surface},
-                                                    {"volume", Model::volume},
-                                                    {"fem", Model::fem}});
-  if (model == Model::volume || model == Model::fem) {
-    organ.fail("model", std::string("is ") + to_string(model) +
-                            ", which needs a solid (tetrahedral) mesh that this version cannot step, use surface");
-  }
-  return model;
+  return organ.choice<Model>("model", {{"contact_only", Model::contact_only},
+                                       {"surface", Model::surface},
+                                       {"volume", Model::volume},
+                                       {"fem", Model::fem}});
 }
 
-Material read_material(const YamlMapping& organ) {
+/// What a model's energies reach of Poisson's ratio.
+struct PoissonRange {
+  double least;
+  const char* allowed;
+};
+
+PoissonRange poisson_range(Model model) {
+  switch (model) {
+    case Model::fem:
+      return {0.0, "a number from 0 to below 0.5"};
+    case Model::volume:
+      return {smallest_volume_poisson, "a number from 0.25 to below 0.5: distances and volumes reach no other, fem does"};
+    default:
+      return {smallest_wall_poisson,
+              "a number from 1/3 (write 0.3334) to below 0.5: the energies of a wall reach no other"};
+  }
+}
+
+Material read_material(const YamlMapping& organ, Model model) {
   const YamlMapping yaml = organ.mapping("material", {"young", "poisson", "density", "damping", "drag"});
   Material material;
   material.young = yaml.number("young", above_zero, "a number above 0, in Pa (liver 5400, stomach wall 200000)");
+  const PoissonRange range = poisson_range(model);
   material.poisson = yaml.number(
-      "poisson", [](double x) { return x >= smallest_wall_poisson && x < 0.5; },
-      "a number from 1/3 (write 0.3334) to below 0.5: the energies of a wall reach no other");
+      "poisson", [&](double x) { return x >= range.least && x < 0.5; }, range.allowed);
   material.density = yaml.number("density", above_zero, "a number above 0, in kg/m^3 (soft tissue 1060)");
   material.damping = yaml.number(
       "damping", [](double x) { return x >= 0.0 && x <= 1.0; }, "a number from 0 to 1", 0.1);
@@ -171,6 +192,59 @@ auto load_from(const YamlMapping& yaml, const std::string& key, std::vector<std:
   }
 }
 
+/// The command that makes the solid that is missing, for the message that misses it.
+std::string make_solid_command(const Organ& organ, const std::string& surface, double scale) {
+  const MeshTopology topology =
+      build_topology(static_cast<int>(organ.mesh.vertices.size()), organ.mesh.triangles);
+  const double edge = 1e3 * mean_edge_length(organ.mesh.vertices, topology.edges);
+  const std::string out = surface.substr(0, surface.rfind('.')) + ".msh";
+  std::ostringstream command;
+  command << "scripts/make_solid " << surface << " " << out << " --edge " << std::setprecision(2) << edge;
+  if (scale != 0.001) command << " --scale " << std::setprecision(6) << scale;
+  return command.str();
+}
+
+/// The surface, and for a solid organ its tetrahedra: those of `mesh`, or those of `solid` that carry the surface.
+void read_shape(const YamlMapping& yaml, double scale, std::vector<std::string>& warnings, Organ& organ) {
+  using Warnings = std::vector<std::string>;
+  std::string surface;
+  organ.mesh = load_from(yaml, "mesh", warnings, [&](const std::string& path, Warnings& said) {
+    surface = path;
+    if (!is_tetrahedral_mesh(path)) return load_organ_mesh(path, scale, said);
+    organ.solid = read_tetrahedral_mesh(path, scale, said);
+    sort_vertices_for_locality(organ.solid);
+    TriangleMesh mesh = take_surface(organ.solid);
+    sort_for_locality(organ.solid);
+    return mesh;
+  });
+  if (!is_solid(organ.model)) {
+    if (yaml.has("solid")) yaml.fail("solid", "is used by the models volume and fem only, delete it");
+    organ.solid = TetrahedralMesh();
+    return;
+  }
+  if (!yaml.has("solid")) {
+    if (!organ.solid.empty()) return;
+    yaml.fail("mesh", std::string("is a surface, and model ") + to_string(organ.model) +
+                          " needs a solid: name the file that this command makes: " +
+                          make_solid_command(organ, surface, scale));
+  }
+  if (!organ.solid.empty()) yaml.fail("solid", "stands beside a mesh that is a solid itself, delete one of them");
+  organ.embedded = true;
+  organ.solid = load_from(yaml, "solid", warnings, [&](const std::string& path, Warnings& said) {
+    TetrahedralMesh solid = read_tetrahedral_mesh(path, scale, said);
+    sort_vertices_for_locality(solid);
+    sort_for_locality(solid);
+    return solid;
+  });
+  const double outside = embed(organ.mesh.vertices, organ.solid).farthest_outside;
+  const MeshTopology topology = build_topology(static_cast<int>(organ.mesh.vertices.size()), organ.mesh.triangles);
+  const double allowed = farthest_outside * mean_edge_length(organ.mesh.vertices, topology.edges);
+  if (outside > allowed) {
+    yaml.fail("solid", "leaves vertices of the mesh " + metres(outside) + " outside, allowed are " + metres(allowed) +
+                           ": is it made from this mesh? " + make_solid_command(organ, surface, scale));
+  }
+}
+
 /// All of an organ, its mesh still in its own frame and nothing attached.
 Organ read_organ(const YamlMapping& yaml, std::vector<std::string>& warnings) {
   Organ organ;
@@ -181,25 +255,29 @@ Organ read_organ(const YamlMapping& yaml, std::vector<std::string>& warnings) {
       "colliding_set", {{"flood", CollidingSet::flood}, {"paper", CollidingSet::paper}}, CollidingSet::flood);
   organ.depth = yaml.choice<DepthScheme>("depth", {{"exact", DepthScheme::exact}, {"paper", DepthScheme::paper}},
                                          DepthScheme::exact);
+  organ.integrator = yaml.choice<Integrator>("integrator",
+                                             {{"auto", Integrator::automatic},
+                                              {"explicit", Integrator::explicit_substeps},
+                                              {"vertex_block_descent", Integrator::vertex_block_descent}},
+                                             Integrator::automatic);
   if (organ.model == Model::surface) {
     organ.wall_thickness = yaml.number("wall_thickness", above_zero, "a number above 0, in metres");
   } else if (yaml.has("wall_thickness")) {
     yaml.fail("wall_thickness", "is used by the model surface only, delete it");
   }
-  if (organ.model == Model::surface || yaml.has("material")) organ.material = read_material(yaml);
+  if (organ.model != Model::contact_only || yaml.has("material")) organ.material = read_material(yaml, organ.model);
   const double scale =
       yaml.number("scale", above_zero, "a number above 0: file units to metres, 0.001 for millimetres");
-  organ.mesh = load_from(yaml, "mesh", warnings, [&](const std::string& path, std::vector<std::string>& said) {
-    return load_organ_mesh(path, scale, said);
-  });
+  read_shape(yaml, scale, warnings, organ);
   return organ;
 }
 
 /// Attaches an organ and carries it into the scene's frame.
 void place_organ(const YamlMapping& yaml, const Pose& pose, Organ& organ) {
-  organ.attached = read_attachments(yaml, organ.mesh.vertices);
+  organ.attached = read_attachments(yaml, organ.solid.empty() ? organ.mesh.vertices : organ.solid.vertices);
   const double volume = enclosed_volume(organ.mesh);
   for (Vector3& p : organ.mesh.vertices) p = pose.apply(p);
+  for (Vector3& p : organ.solid.vertices) p = pose.apply(p);
   if (!(std::abs(enclosed_volume(organ.mesh) - volume) <= 1e-6 * volume)) {
     yaml.fail("pose", "moves the organ so far that rounding changes its shape, is xyz in metres?");
   }
@@ -271,8 +349,8 @@ Scene load_scene(const std::string& path, std::vector<std::string>& warnings) {
   const Frames frames = read_frames(yaml, scene.frame);
 
   const std::vector<YamlMapping> organs =
-      yaml.list("organs", {"name", "mesh", "scale", "pose", "model", "restoration", "wall_thickness", "material",
-                           "attachments", "colliding_set", "depth"});
+      yaml.list("organs", {"name", "mesh", "solid", "scale", "pose", "model", "restoration", "wall_thickness",
+                           "material", "attachments", "colliding_set", "depth", "integrator"});
   const std::vector<YamlMapping> instruments = yaml.list("instruments", {"name", "urdf", "tip_link", "pose_topic"});
   if (organs.empty()) yaml.fail("organs", "is missing or empty, a scene has at least one organ");
   if (instruments.empty()) yaml.fail("instruments", "is missing or empty, a scene has at least one instrument");

@@ -12,43 +12,63 @@ namespace {
 /// flat, 2 only just did not.
 constexpr double covered_stiffening = 1.5;
 
+/// Forces of neo-Hookean tetrahedra, damped by evaluating them where the vertices will be after damping_time.
+void tetrahedra_forces(const RestShape& rest, const OrganState& state, ElementRoom& room,
+                       std::vector<Vector3>& forces) {
+  for (std::size_t v = 0; v < forces.size(); ++v) {
+    const Vector3 displacement =
+        state.positions[v] - rest.positions[v] + rest.damping_time * state.velocities[v];
+    room.displacements[v] << displacement.cast<float>(), 0.0F;
+    room.forces[v].setZero();
+  }
+  add_neo_hookean_forces(rest.packed, room.displacements.front().data(), room.forces.front().data());
+  for (std::size_t v = 0; v < forces.size(); ++v) forces[v] = room.forces[v].head<3>().cast<double>();
+}
+
 }  // namespace
+
+void prepare(ElementRoom& room, const RestShape& rest) {
+  if (rest.enclosed.stiffness > 0.0) room.gradient.assign(rest.positions.size(), Vector3::Zero());
+  if (rest.packed.batches.empty()) return;
+  room.displacements.assign(rest.positions.size(), Eigen::Vector4f::Zero());
+  room.forces = room.displacements;
+}
 
 int substeps_for(const RestShape& rest, double duration) {
   if (!rest.elastic()) return 1;
   return std::max(1, static_cast<int>(std::ceil(duration / rest.stable_substep - 1e-9)));
 }
 
-double element_forces(const RestShape& rest, const OrganState& state, std::vector<Vector3>& forces,
-                      std::vector<Vector3>& gradient) {
+void element_forces(const RestShape& rest, const OrganState& state, std::vector<Vector3>& forces, ElementRoom& room) {
+  if (!rest.packed.batches.empty()) {
+    tetrahedra_forces(rest, state, room, forces);
+    return;
+  }
   std::fill(forces.begin(), forces.end(), Vector3::Zero());
   const StiffnessLimit limit = {rest.inverse_mass, covered_stiffening * rest.stiffest_element};
-  double energy = 0.0;
   for (const DistanceElement& element : rest.distances) {
-    energy += add_forces(element, limit, state.positions, state.velocities, forces);
+    add_forces(element, limit, state.positions, state.velocities, forces);
   }
   for (const AreaElement& element : rest.areas) {
-    energy += add_forces(element, limit, state.positions, state.velocities, forces);
+    add_forces(element, limit, state.positions, state.velocities, forces);
   }
-  for (const VolumeElement& element : rest.flaps) {
-    energy += add_forces(element, limit, state.positions, state.velocities, forces);
+  for (const VolumeElement& element : rest.volumes) {
+    add_forces(element, limit, state.positions, state.velocities, forces);
   }
-  if (!(rest.enclosed.stiffness > 0.0)) return energy;
+  if (!(rest.enclosed.stiffness > 0.0)) return;
 
-  const double c = rest.enclosed.evaluate(state.positions, rest.triangles, gradient);
+  const double c = rest.enclosed.evaluate(state.positions, rest.triangles, room.gradient);
   double rate = 0.0;
-  for (std::size_t v = 0; v < gradient.size(); ++v) rate += gradient[v].dot(state.velocities[v]);
+  for (std::size_t v = 0; v < forces.size(); ++v) rate += room.gradient[v].dot(state.velocities[v]);
   const double pull = rest.enclosed.stiffness * c + rest.enclosed.damping * rate;
-  for (std::size_t v = 0; v < gradient.size(); ++v) forces[v] -= pull * gradient[v];
-  return energy + 0.5 * rest.enclosed.stiffness * c * c;
+  for (std::size_t v = 0; v < forces.size(); ++v) forces[v] -= pull * room.gradient[v];
 }
 
-double integrate(const OrganModel& organ, const Vector3& gravity, double dt, const std::vector<Vector3>& forces,
-                 OrganState& state) {
+void accelerate(const OrganModel& organ, const Vector3& gravity, double dt, const std::vector<Vector3>& forces,
+                OrganState& state) {
   const double slowed = 1.0 / (1.0 + dt * organ.drag);
   const RestShape& rest = organ.rest;
-  double fastest = 0.0;
-  for (std::size_t v = 0; v < forces.size(); ++v) {
+  for (std::size_t v = static_cast<std::size_t>(rest.first_simulated); v < forces.size(); ++v) {
     if (rest.attached[v]) continue;
     if (state.held[v]) {
       state.velocities[v].setZero();
@@ -56,6 +76,14 @@ double integrate(const OrganModel& organ, const Vector3& gravity, double dt, con
     }
     const Vector3 change = dt * (rest.inverse_mass[v] * forces[v] + gravity);
     state.velocities[v] = slowed * (state.velocities[v] + change);
+  }
+}
+
+double advance(const OrganModel& organ, double dt, OrganState& state) {
+  const RestShape& rest = organ.rest;
+  double fastest = 0.0;
+  for (std::size_t v = static_cast<std::size_t>(rest.first_simulated); v < state.positions.size(); ++v) {
+    if (rest.attached[v] || state.held[v]) continue;
     state.positions[v] += dt * state.velocities[v];
     fastest = std::max(fastest, state.velocities[v].squaredNorm());
   }

@@ -56,27 +56,26 @@ Vector3 velocity_of(const Pose& before, const Pose& now, const Vector3& point, d
 
 /// The same place of the organ has the same number in every substep of a step: its vertex, or its triangle behind all
 /// vertices.
-std::size_t place_of(const ContactPoint& point, std::size_t vertices) {
+std::size_t place_of(const ContactPoint& point, const RestShape& rest) {
   for (int i = 0; i < 3; ++i) {
-    if (point.weights[i] >= 1.0) return static_cast<std::size_t>(point.vertices[i]);
+    if (point.weights[i] >= 1.0) return static_cast<std::size_t>(rest.triangles[point.triangle][i]);
   }
-  return vertices + static_cast<std::size_t>(point.triangle);
+  return static_cast<std::size_t>(rest.surface_vertices + point.triangle);
 }
 
-/// A held vertex gains no velocity that the response could stop: what its elements push with, the instrument bears.
-void bear_held(const OrganState& state, double dt, ContactPoint& point) {
-  for (int i = 0; i < 3; ++i) {
-    const int vertex = point.vertices[i];
-    if (!state.held[vertex]) continue;
-    point.impulse += point.weights[i] * dt * std::max(0.0, -point.direction.dot(state.forces[vertex]));
-  }
+std::size_t count_places(const RestShape& rest) {
+  return static_cast<std::size_t>(rest.surface_vertices) + rest.triangles.size();
 }
 
+std::size_t place_of_piece(const ContactPoint& point, const RestShape& rest) {
+  return static_cast<std::size_t>(point.piece) * count_places(rest) + place_of(point, rest);
+}
+
+/// Adds what a substep has found at a contact point to the contact that the step reports there.
 void record_contact(StepContext& context, const ContactPoint& point) {
   OrganWorkspace& work = context.work();
-  const std::size_t vertices = context.state.positions.size();
-  const std::size_t places = vertices + context.model().rest.triangles.size();
-  const std::size_t place = static_cast<std::size_t>(point.piece) * places + place_of(point, vertices);
+  const RestShape& rest = context.model().rest;
+  const std::size_t place = place_of_piece(point, rest);
   if (work.contact_step[place] != context.report.step) {
     work.contact_step[place] = context.report.step;
     work.contact_of[place] = static_cast<int>(work.contacts.size());
@@ -92,16 +91,44 @@ void record_contact(StepContext& context, const ContactPoint& point) {
   contact.barycentric = point.weights;
   contact.direction = point.direction;
   contact.depth = point.target;  // turned into a depth when the step ends
-  contact.force += point.impulse / context.motion.duration * point.direction;
+  contact.force += context.dt / context.motion.duration * point.force * point.direction;
 }
 
-void push_on_instrument(StepContext& context, const ContactPoint& point) {
-  const int instrument = context.world.pieces[point.piece].instrument;
-  const Vector3 place = at_point(point, context.state.positions);
-  const Vector3 force = -point.impulse / context.motion.duration * point.direction;
-  Wrench& wrench = context.report.wrenches[instrument];
-  wrench.force += force;
-  wrench.torque += (place - context.workspace.now[instrument].position).cross(force);
+/// Points start from the force that was found at their places in the substep before.
+void remember_forces(const RestShape& rest, const OrganState& state, OrganWorkspace& work) {
+  for (const PlaceForce& pressing : state.pressing) work.force_of[pressing.place] = pressing.force;
+  for (ContactPoint& point : work.points) point.force = work.force_of[place_of_piece(point, rest)];
+  for (const PlaceForce& pressing : state.pressing) work.force_of[pressing.place] = 0.0;
+}
+
+void keep_forces(const RestShape& rest, const OrganWorkspace& work, OrganState& state) {
+  state.pressing.clear();
+  for (const ContactPoint& point : work.points) state.pressing.push_back({place_of_piece(point, rest), point.force});
+}
+
+/// Moves the simulated vertices. Returns the largest speed of one, m/s.
+double integrate_elements(StepContext& context) {
+  const OrganModel& model = context.model();
+  OrganState& state = context.state;
+  OrganWorkspace& work = context.work();
+  if (model.integrator == Integrator::vertex_block_descent) {
+    stop_at_instrument(work.points, model.rest.inverse_mass, state.positions, context.dt, state.velocities);
+    remember_forces(model.rest, state, work);
+    const double speed = descend(model, context.world.gravity, context.dt, work.points, state, work.descent);
+    keep_forces(model.rest, work, state);
+    bearing_forces(model, work.points, state, state.forces);
+    return speed;
+  }
+  element_forces(model.rest, state, state.forces, work.elements);
+  accelerate(model, context.world.gravity, context.dt, state.forces, state);
+  stop_at_instrument(work.points, model.rest.inverse_mass, state.positions, context.dt, state.velocities);
+  return advance(model, context.dt, state);
+}
+
+/// What has moved by itself: the tree and the clearances have to know.
+void note_motion(StepContext& context, double way) {
+  context.work().travel += way;
+  for (Clearance& clearance : context.state.clearances) clearance.shift += way;
 }
 
 }  // namespace
@@ -125,8 +152,14 @@ Workspace build_workspace(const World& world) {
       prepare(work.detections[p], surface);
       prepare(work.penetrations[p], surface);
     }
-    work.gradient.assign(rest.positions.size(), Vector3::Zero());
-    const std::size_t places = world.pieces.size() * (rest.positions.size() + rest.triangles.size());
+    work.accelerations.assign(rest.positions.size(), Vector3::Zero());
+    const std::size_t places = world.pieces.size() * count_places(rest);
+    if (model.integrator == Integrator::vertex_block_descent) {
+      prepare(work.descent, rest);
+      work.force_of.assign(places, 0.0);
+    } else {
+      prepare(work.elements, rest);
+    }
     work.contact_of.assign(places, 0);
     work.contacts.reserve(usual_contacts);
     work.contact_step.assign(places, 0);
@@ -180,7 +213,8 @@ int count_substeps(StepContext& context) {
   }
   const double cuts = std::ceil(farthest / model.motion_limit);
   const int for_motion = cuts <= most_motion_substeps ? static_cast<int>(cuts) : 1;
-  const int for_elements = context.state.asleep && !near ? 1 : substeps_for(model.rest, context.motion.duration);
+  const bool one_is_enough = model.integrator == Integrator::vertex_block_descent || (context.state.asleep && !near);
+  const int for_elements = one_is_enough ? 1 : substeps_for(model.rest, context.motion.duration);
   const int substeps = std::max({1, for_motion, for_elements});
   context.dt = context.motion.duration / substeps;
   context.report.substeps = std::max(context.report.substeps, substeps);
@@ -225,7 +259,8 @@ void find_crossings(StepContext& context) {
   for (std::size_t p = 0; p < context.world.pieces.size(); ++p) {
     const InstrumentPiece& piece = context.world.pieces[p];
     // What collides by the paper's memory alone goes on colliding while the instrument is away.
-    if (!work.near[p] && context.model().colliding_set == CollidingSet::flood) {
+    const bool remembers = context.model().colliding_set == CollidingSet::paper;
+    if (!context.motion.instruments[piece.instrument].placed || (!work.near[p] && !remembers)) {
       context.state.touching[p].clear();
       work.detections[p].colliding.clear();
       continue;
@@ -281,6 +316,7 @@ void respond(StepContext& context) {
   }
   if (work.points.empty()) return;
 
+  if (!rest.embedding.corners.empty()) bear_by(rest.embedding, rest.triangles, work.points);
   context.state.asleep = context.state.asleep && !rest.elastic();
   for (ContactPoint& point : work.points) {
     const int instrument = context.world.pieces[point.piece].instrument;
@@ -290,29 +326,30 @@ void respond(StepContext& context) {
   }
   std::vector<char>* held = context.model().restoration ? nullptr : &context.state.held;
   const double way = push_out(work.points, rest.inverse_mass, context.state.positions, held);
-  if (rest.elastic()) stop_at_instrument(work.points, rest.inverse_mass, context.state.velocities);
-  work.travel += way;
-  for (Clearance& clearance : context.state.clearances) clearance.shift += way;
-  for (ContactPoint& point : work.points) {
-    bear_held(context.state, context.dt, point);
-    record_contact(context, point);
-    push_on_instrument(context, point);
-  }
+  note_motion(context, way);
 }
 
 void deform(StepContext& context) {
   const OrganModel& model = context.model();
   if (!model.rest.elastic() || context.state.asleep) return;
   const Lap lap(context.report.profile.deformation);
-  OrganWorkspace& work = context.work();
-  element_forces(model.rest, context.state, context.state.forces, work.gradient);
-  const double speed = integrate(model, context.world.gravity, context.dt, context.state.forces, context.state);
-  work.travel += context.dt * speed;
-  for (Clearance& clearance : context.state.clearances) clearance.shift += context.dt * speed;
+  const OrganWorkspace& work = context.work();
+  const double speed = integrate_elements(context);
+  const double carried = carry_surface(model.rest, context.state.positions);
+  note_motion(context, std::max(context.dt * speed, carried));
   if (work.points.empty() && speed < sleep_speed) {
     context.state.asleep = true;
     std::fill(context.state.velocities.begin(), context.state.velocities.end(), Vector3::Zero());
   }
+}
+
+void bear(StepContext& context) {
+  OrganWorkspace& work = context.work();
+  if (work.points.empty()) return;
+  const Lap lap(context.report.profile.response);
+  const RestShape& rest = context.model().rest;
+  if (rest.elastic()) bear_forces(rest.inverse_mass, context.state.forces, work.accelerations, work.points);
+  for (const ContactPoint& point : work.points) record_contact(context, point);
 }
 
 void check_health(StepContext& context) {
@@ -328,7 +365,6 @@ void check_health(StepContext& context) {
   std::fill(context.state.velocities.begin(), context.state.velocities.end(), Vector3::Zero());
   work.contacts.clear();
   forget(work);
-  for (Wrench& wrench : context.report.wrenches) wrench = Wrench();
   context.report.recovered = true;
 }
 
@@ -351,6 +387,9 @@ void report_contacts(StepContext& context) {
       double& depth = context.state.depths[corners[i]];
       depth = std::max(depth, contact.barycentric[i] * contact.depth);
     }
+    Wrench& wrench = context.report.wrenches[contact.instrument];
+    wrench.force -= contact.force;
+    wrench.torque -= (contact.point - context.motion.instruments[contact.instrument].to.position).cross(contact.force);
     context.report.contacts.push_back(contact);
   }
 }

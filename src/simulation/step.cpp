@@ -18,6 +18,7 @@ void step_organ(StepContext& context) {
     propagate_depths(context);                // stage 3: Eq. 4-6
     respond(context);                         // colliding vertices, edges and poked triangles out of the instrument
     deform(context);                          // elements: C, its gradient, k; integration; what is plastic stays
+    bear(context);                            // the instruments bear the forces of the tissue that they touch
   }
   check_health(context);
   report_contacts(context);

@@ -4,6 +4,7 @@
 
 #include "tissue_sim/simulation/integrator.h"
 #include "tissue_sim/simulation/step.h"
+#include "tissue_sim/tissue/energy.h"
 
 namespace tissue_sim {
 
@@ -235,18 +236,19 @@ const StepReport& Timeline::report() const {
 }
 
 OrganView Timeline::organ(int index) const {
-  return {impl_->state.organs[index].positions, impl_->state.organs[index].depths};
+  const OrganState& state = impl_->state.organs[index];
+  return {{state.positions.data(), state.depths.size()}, {state.depths.data(), state.depths.size()}};
 }
 
 OrganSummary Timeline::summary(int organ) const {
   const RestShape& rest = impl_->world.organs[organ].rest;
   OrganSummary summary;
-  summary.vertices = static_cast<int>(rest.positions.size());
+  summary.vertices = rest.surface_vertices;
   summary.triangles = static_cast<int>(rest.triangles.size());
   summary.attached = static_cast<int>(std::count(rest.attached.begin(), rest.attached.end(), 1));
   summary.distance_elements = static_cast<int>(rest.distances.size());
   summary.area_elements = static_cast<int>(rest.areas.size());
-  summary.volume_elements = static_cast<int>(rest.flaps.size()) + (rest.enclosed.stiffness > 0.0 ? 1 : 0);
+  summary.volume_elements = static_cast<int>(rest.volumes.size()) + (rest.enclosed.stiffness > 0.0 ? 1 : 0);
   summary.mass = rest.total_mass;
   summary.added_mass = rest.added_mass;
   summary.stable_substep = rest.stable_substep;
@@ -277,17 +279,17 @@ double Timeline::kinetic_energy() const {
 double Timeline::elastic_energy() const {
   double energy = 0.0;
   for (std::size_t o = 0; o < impl_->state.organs.size(); ++o) {
-    std::vector<Vector3> forces(impl_->state.organs[o].positions.size());
-    std::vector<Vector3> gradient(forces.size());
-    energy += element_forces(impl_->world.organs[o].rest, impl_->state.organs[o], forces, gradient);
+    energy += tissue_sim::elastic_energy(impl_->world.organs[o].rest, impl_->state.organs[o].positions);
   }
   return energy;
 }
 
 int Timeline::active_vertices() const {
   int active = 0;
-  for (const OrganState& organ : impl_->state.organs) {
-    if (!organ.asleep) active += static_cast<int>(organ.positions.size());
+  for (std::size_t o = 0; o < impl_->state.organs.size(); ++o) {
+    const OrganState& organ = impl_->state.organs[o];
+    const RestShape& rest = impl_->world.organs[o].rest;
+    if (!organ.asleep) active += static_cast<int>(organ.positions.size()) - rest.first_simulated;
   }
   return active;
 }

@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "tissue_sim/simulation/integrator.h"
+#include "tissue_sim/simulation/vertex_block_descent.h"
 
 namespace tissue_sim {
 
@@ -21,6 +22,10 @@ constexpr double thickness_fraction = 0.25;
 /// surface between two vertices that it touches.
 constexpr double sharp = 3.0;
 
+/// Substeps of explicit integration that cost as much as one sweep of vertex block descent, which sees each element once
+/// for each of its vertices.
+constexpr int explicit_substeps_limit = 10;
+
 void refuse_if_too_stiff(const Scene& scene, const Organ& organ, const RestShape& rest) {
   const int substeps = substeps_for(rest, scene.time_step);
   if (substeps <= scene.max_substeps) return;
@@ -33,6 +38,26 @@ void refuse_if_too_stiff(const Scene& scene, const Organ& organ, const RestShape
        << "; time_step: " << 0.99 * time_step << " or material young: " << 0.98 * softer * organ.material.young
        << " would do, or a higher max_substeps";
   throw SceneError(line.str());
+}
+
+/// `auto`: explicit where it is stable with few substeps, since that is cheapest and exact in motion too.
+void choose_integrator(const Scene& scene, const Organ& organ, OrganModel& model) {
+  const int substeps = substeps_for(model.rest, scene.time_step);
+  model.integrator = organ.integrator;
+  if (organ.integrator != Integrator::automatic) {
+    model.integrator_reason = "the scene asks for it";
+    return;
+  }
+  const bool many = is_solid(organ.model) && substeps > explicit_substeps_limit;
+  model.integrator = many ? Integrator::vertex_block_descent : Integrator::explicit_substeps;
+  if (!model.rest.elastic()) {
+    model.integrator_reason = "nothing to integrate";
+    return;
+  }
+  std::ostringstream reason;
+  reason << "explicit " << (many ? "would need " : "needs ") << substeps << " substep(s) a step, "
+         << (many ? "more than " : "solids may take up to ") << explicit_substeps_limit;
+  model.integrator_reason = reason.str();
 }
 
 }  // namespace
@@ -65,7 +90,13 @@ World build_world(const Scene& scene) {
     for (const InstrumentPiece& piece : world.pieces) {
       model.poking.push_back(sharper_than(piece.surface, sharp * model.rest.mean_edge));
     }
-    refuse_if_too_stiff(scene, organ, model.rest);
+    choose_integrator(scene, organ, model);
+    if (model.integrator == Integrator::vertex_block_descent) {
+      model.incidence = build_incidence(model.rest);
+    } else {
+      refuse_if_too_stiff(scene, organ, model.rest);
+      model.rest.packed = pack(model.rest.tetrahedra);
+    }
     world.organs.push_back(std::move(model));
   }
   return world;

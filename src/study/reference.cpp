@@ -16,16 +16,17 @@ namespace {
 using Vectors = std::vector<Vector3>;
 using SparseMatrix = Eigen::SparseMatrix<double>;
 
-constexpr double armijo = 1e-4;            ///< 1, of the decrease that the slope promises
-constexpr double energy_rounding = 1e-15;  ///< 1, of the shear modulus times volume: a smaller rise says nothing
-constexpr int halvings = 30;               ///< of a Newton step before it is taken as it is
-constexpr int free_changes = 4;            ///< a vertex that was let go more often waits until the others are at rest
-constexpr double length_rounding = 1e-12;  ///< 1, of the solid's size: nearer is there
-constexpr double least_reaction = 1e-8;    ///< 1, of the shear modulus times the square of the solid's size
-constexpr int patience = 10;               ///< iterations without getting nearer, as where rounding is reached
-constexpr double loose = 1e-3;             ///< 1, tolerance of the load steps before the last
-constexpr double near = 1e-3;              ///< 1, of the solid's size: so near to the obstacle a start touches it
-constexpr double grazing = 0.1;            ///< 1, of a contact's direction along the free axes; less can push nothing
+constexpr double armijo = 1e-4;             ///< 1, of the decrease that the slope promises
+constexpr double energy_rounding = 1e-15;   ///< 1, of the shear modulus times volume: a smaller rise says nothing
+constexpr int halvings = 30;                ///< of a Newton step before it is taken as it is
+constexpr int free_changes = 4;             ///< a vertex that was let go more often waits until the others are at rest
+constexpr double length_rounding = 1e-12;   ///< 1, of the solid's size: nearer is there
+constexpr double least_reaction = 1e-8;     ///< 1, of the shear modulus times the square of the solid's size
+constexpr int patience = 10;                ///< iterations without getting nearer, as where rounding is reached
+constexpr double loose = 1e-3;              ///< 1, tolerance of the load steps before the last
+constexpr double near = 1e-3;               ///< 1, of the solid's size: so near to the obstacle a start touches it
+constexpr double smallest_step = 1.0 / 64;  ///< 1, of a load step: how far it is halved where Newton fails
+constexpr double grazing = 0.1;             ///< 1, of a contact's direction along the free axes; less can push nothing
 
 /// The lower triangle of a symmetric matrix of 3 x 3 blocks, a block for every two vertices that share a tetrahedron.
 struct BlockMatrix {
@@ -113,6 +114,7 @@ class Solver {
 
  private:
   bool settle(double load, double tolerance);
+  int inverted(const Vectors& positions) const;
   double evaluate(const Vectors& positions, double load, Vectors& gradient) const;
   ObstaclePoint obstacle_at(const Vector3& x, double load) const;
   Vector3 along_free(int vertex, const Vector3& direction) const;
@@ -149,6 +151,7 @@ class Solver {
   bool changed = false;               ///< the active set, in this iteration
   double left_over = 0.0;             ///< N
   double reaction = 0.0;              ///< N
+  bool careful = false;               ///< there is a smaller load step to try
   int iterations = 0;
 };
 
@@ -439,6 +442,17 @@ Vectors Solver::moved(const Vectors& step, double part, double load) const {
   return result;
 }
 
+int Solver::inverted(const Vectors& positions) const {
+  int result = 0;
+  for (const Tetrahedron& t : problem.mesh.tetrahedra) {
+    const double volume =
+        tetrahedron_volume(positions[at(t[0])], positions[at(t[1])], positions[at(t[2])], positions[at(t[3])]);
+    if (!(volume > 0.0)) ++result;
+  }
+  return result;
+}
+
+/// Newton at one load, from where the last one ended.
 bool Solver::settle(double load, double tolerance) {
   std::fill(releases.begin(), releases.end(), 0);
   Vectors gradient;
@@ -466,6 +480,7 @@ bool Solver::settle(double load, double tolerance) {
       least = left_over;
       idle = 0;
     } else if (++idle == patience) {
+      careful = false;
       return false;
     }
     if (iteration == options.max_iterations || !std::isfinite(energy)) return false;
@@ -481,6 +496,7 @@ bool Solver::settle(double load, double tolerance) {
     ++iterations;
     // Where something has yet to go to its place the energy has to rise: such a step is taken whole.
     Vectors trial = moved(step, 1.0, load);
+    if (!there && careful && inverted(trial) > inverted(x)) return false;
     double part = 1.0;
     for (int halving = 0; there && halving < halvings; ++halving) {
       const double trial_energy = evaluate(trial, load, trial_gradient);
@@ -501,10 +517,22 @@ ReferenceSolution Solver::solve() {
       if (pushable && point.depth > -near * length) touching[at(vertex)] = 1;
     }
   }
-  for (int step = 1; step <= options.load_steps; ++step) {
-    const double load = static_cast<double>(step) / options.load_steps;
-    const bool last = step == options.load_steps;
-    result.converged = settle(last ? 1.0 : load, last ? options.tolerance : std::max(loose, options.tolerance));
+  double part = 1.0 / options.load_steps;
+  const double smallest = smallest_step * part;
+  for (double done = 0.0; done < 1.0;) {
+    const bool last = done + part > 1.0 - smallest;
+    const double load = last ? 1.0 : done + part;
+    const Vectors before = x;
+    const std::vector<char> touching_before = touching;
+    careful = part > smallest;
+    result.converged = settle(load, last ? options.tolerance : std::max(loose, options.tolerance));
+    if (result.converged || !careful) {
+      done = load;
+      continue;
+    }
+    x = before;
+    touching = touching_before;
+    part *= 0.5;
   }
   result.positions = x;
   Vectors gradient;

@@ -4,28 +4,21 @@
 #include <cmath>
 
 #include "tissue_sim/geometry/aabb_tree.h"
-#include "tissue_sim/tissue/material.h"
+#include "tissue_sim/tissue/solid.h"
 #include "tissue_sim/tissue/stability.h"
+#include "tissue_sim/tissue/wall.h"
 
 namespace tissue_sim {
 
 namespace {
 
-// Floors for measures that are near zero at rest, as fractions of the mean over the organ. Without the last, Eq. 8
-// divides by zero on every flat pair of triangles.
-constexpr double shortest_length = 0.5;
-constexpr double smallest_area = 0.25;
-constexpr double smallest_volume = 0.1;  ///< of the cube of the flap's own mean edge
-
 /// Of the organ's mass: what the mass floor may add. On a liver-like surface 0.26 % took 108 substeps to 11.
 constexpr double mass_floor = 0.005;
 
-/// Of the substep that is stable at rest: a stretched surface is stiffer, and contact confines it.
-constexpr double safety = 0.4;
-
-/// How much stiffer than its wall an organ's content is when both are blown up alike. 10 keeps the volume to a tenth of
-/// what the wall alone would let it change.
-constexpr double content_over_wall = 10.0;
+/// Of the substep that is stable at rest: a stretched surface is stiffer, and contact confines it. 0.9 was seen to go
+/// unstable in a solid that contact confines.
+constexpr double surface_safety = 0.4;
+constexpr double solid_safety = 0.7;
 
 std::vector<int> find_component_roots(const MeshTopology& topology, int vertex_count) {
   std::vector<int> roots;
@@ -51,89 +44,6 @@ std::vector<int> find_component_roots(const MeshTopology& topology, int vertex_c
   return roots;
 }
 
-std::vector<double> triangle_areas(const RestShape& shape) {
-  std::vector<double> areas;
-  for (const auto& [a, b, c] : shape.triangles) {
-    areas.push_back(0.5 * area_normal(shape.positions[a], shape.positions[b], shape.positions[c]).norm());
-  }
-  return areas;
-}
-
-double edge_length(const RestShape& shape, int edge) {
-  const auto& [a, b] = shape.topology.edges[edge];
-  return (shape.positions[b] - shape.positions[a]).norm();
-}
-
-int opposite_corner(const RestShape& shape, int triangle, int edge) {
-  const auto& [a, b] = shape.topology.edges[edge];
-  for (const int vertex : shape.triangles[triangle]) {
-    if (vertex != a && vertex != b) return vertex;
-  }
-  return -1;
-}
-
-void add_distances(const WallStiffness& wall, const std::vector<double>& areas, RestShape& shape) {
-  for (std::size_t e = 0; e < shape.topology.edges.size(); ++e) {
-    DistanceElement element;
-    element.vertices = shape.topology.edges[e];
-    element.rest = edge_length(shape, static_cast<int>(e));
-    element.scale = std::max(element.rest, shortest_length * shape.mean_edge);
-    for (const int t : shape.topology.edge_triangles[e]) {
-      if (t >= 0)
-        element.stiffness += wall.distance * areas[t] / 3.0;  // each triangle shares its area among three edges
-    }
-    shape.distances.push_back(element);
-  }
-}
-
-void add_areas(const WallStiffness& wall, const std::vector<double>& areas, double mean_area, RestShape& shape) {
-  if (!(wall.area > 0.0)) return;
-  for (std::size_t t = 0; t < shape.triangles.size(); ++t) {
-    AreaElement element;
-    element.vertices = shape.triangles[t];
-    element.rest = areas[t];
-    element.scale = std::max(element.rest, smallest_area * mean_area);
-    element.stiffness = wall.area * areas[t];
-    shape.areas.push_back(element);
-  }
-}
-
-/// A flap of edge length l between triangles of area A1 and A2 turns by dV = 2 A1 A2 / (3 l) an angle. A hexagonal
-/// lattice of hinges with energy 1/2 kappa angle^2 bends like a plate of stiffness D when kappa = D l^2 / (A1 + A2)
-/// (Seung and Nelson 1988), so k = kappa (scale / dV)^2.
-void add_flaps(const WallStiffness& wall, const std::vector<double>& areas, double mean_area, RestShape& shape) {
-  for (std::size_t e = 0; e < shape.topology.edges.size(); ++e) {
-    const auto& [t1, t2] = shape.topology.edge_triangles[e];
-    if (t1 < 0 || t2 < 0) continue;
-    const int edge = static_cast<int>(e);
-    VolumeElement element;
-    element.vertices = {shape.topology.edges[e][0], shape.topology.edges[e][1], opposite_corner(shape, t1, edge),
-                        opposite_corner(shape, t2, edge)};
-    const ElementVectors<VolumeElement> x = gather(element, shape.positions);
-    double six_edges = 0.0;
-    for (std::size_t i = 0; i < 4; ++i) {
-      for (std::size_t j = i + 1; j < 4; ++j) six_edges += (x[j] - x[i]).norm();
-    }
-    ElementVectors<VolumeElement> gradient;
-    element.rest = element.evaluate(x, gradient);
-    element.scale = std::max(std::abs(element.rest), smallest_volume * std::pow(six_edges / 6.0, 3));
-
-    const double length = std::max(edge_length(shape, edge), shortest_length * shape.mean_edge);
-    const double area_1 = std::max(areas[t1], smallest_area * mean_area);
-    const double area_2 = std::max(areas[t2], smallest_area * mean_area);
-    const double volume_per_angle = 2.0 * area_1 * area_2 / (3.0 * length);
-    const double hinge = wall.bending * length * length / (area_1 + area_2);
-    element.stiffness = hinge * std::pow(element.scale / volume_per_angle, 2);
-    shape.flaps.push_back(element);
-  }
-}
-
-void add_enclosed_volume(const WallStiffness& wall, const Organ& organ, double area, RestShape& shape) {
-  shape.enclosed.rest = enclosed_volume(organ.mesh);
-  const double stiffness_of_wall = 2.0 / 9.0 * area * wall.membrane / (1.0 - organ.material.poisson);
-  shape.enclosed.stiffness = content_over_wall * stiffness_of_wall;
-}
-
 /// d = 2 zeta sqrt(k m_C) with 1 / m_C = sum |grad_i C|^2 / m_i: `ratio` of what makes the element alone return without
 /// swinging.
 template <class Kind>
@@ -157,55 +67,70 @@ void damp_enclosed_volume(double ratio, RestShape& shape) {
   shape.enclosed.damping = 2.0 * ratio * std::sqrt(shape.enclosed.stiffness / inverse_mass);
 }
 
-/// Each triangle of the wall gives a third of its mass to each corner.
-void add_wall_masses(const Organ& organ, const std::vector<double>& areas, RestShape& shape) {
-  shape.mass.assign(shape.positions.size(), 0.0);
-  for (std::size_t t = 0; t < shape.triangles.size(); ++t) {
-    for (const int v : shape.triangles[t])
-      shape.mass[v] += organ.material.density * organ.wall_thickness * areas[t] / 3.0;
+/// The surface, its vertices first; behind it what lies inside, or the whole solid that carries it.
+void place_vertices(const Organ& organ, RestShape& shape) {
+  shape.surface_vertices = static_cast<int>(organ.mesh.vertices.size());
+  shape.positions = organ.mesh.vertices;
+  if (organ.solid.empty()) return;
+  if (!organ.embedded) {
+    shape.positions = organ.solid.vertices;
+    return;
   }
+  shape.first_simulated = shape.surface_vertices;
+  shape.embedding = embed(organ.mesh.vertices, organ.solid);
+  for (Tetrahedron& corners : shape.embedding.corners) {
+    for (int& corner : corners) corner += shape.first_simulated;
+  }
+  shape.positions.insert(shape.positions.end(), organ.solid.vertices.begin(), organ.solid.vertices.end());
+  // Rounding left them within a hair of where the mesh has them; what is carried is where the solid carries it.
+  carry_surface(shape, shape.positions);
 }
 
 }  // namespace
 
+double carry_surface(const RestShape& shape, std::vector<Vector3>& positions) {
+  double farthest = 0.0;
+  for (std::size_t v = 0; v < shape.embedding.corners.size(); ++v) {
+    Vector3 place = Vector3::Zero();
+    for (int i = 0; i < 4; ++i) place += shape.embedding.weights[v][i] * positions[shape.embedding.corners[v][i]];
+    farthest = std::max(farthest, (place - positions[v]).squaredNorm());
+    positions[v] = place;
+  }
+  return std::sqrt(farthest);
+}
+
 RestShape build_rest_shape(const Organ& organ) {
   RestShape shape;
-  shape.positions = organ.mesh.vertices;
+  place_vertices(organ, shape);
   shape.triangles = organ.mesh.triangles;
-  const int vertex_count = static_cast<int>(shape.positions.size());
-  shape.topology = build_topology(vertex_count, shape.triangles);
-  shape.component_roots = find_component_roots(shape.topology, vertex_count);
+  shape.topology = build_topology(shape.surface_vertices, shape.triangles);
+  shape.component_roots = find_component_roots(shape.topology, shape.surface_vertices);
   shape.mean_edge = mean_edge_length(shape.positions, shape.topology.edges);
-  shape.size = bounds_of(shape.positions).size().norm();
+  shape.size = bounds_of(organ.mesh.vertices).size().norm();
   shape.attached.assign(shape.positions.size(), 0);
-  for (const int vertex : organ.attached) shape.attached[vertex] = 1;
-  shape.mass.assign(shape.positions.size(), 1.0);
+  for (const int vertex : organ.attached) shape.attached[vertex + shape.first_simulated] = 1;
+  shape.mass.assign(shape.positions.size(), organ.model == Model::contact_only ? 1.0 : 0.0);
 
-  if (organ.model == Model::surface) {
-    const WallStiffness wall = wall_stiffness(organ.material, organ.wall_thickness);
-    const std::vector<double> areas = triangle_areas(shape);
-    double area = 0.0;
-    for (const double a : areas) area += a;
-    const double mean_area = area / static_cast<double>(areas.size());
-
-    add_wall_masses(organ, areas, shape);
-    add_distances(wall, areas, shape);
-    add_areas(wall, areas, mean_area, shape);
-    add_flaps(wall, areas, mean_area, shape);
-    add_enclosed_volume(wall, organ, area, shape);
+  if (organ.model == Model::surface) add_wall(organ, shape);
+  if (is_solid(organ.model)) add_solid(organ, shape);
+  if (shape.elastic()) {
     apply_mass_floor(mass_floor, shape);
     damp(organ.material.damping, shape, shape.distances);
     damp(organ.material.damping, shape, shape.areas);
-    damp(organ.material.damping, shape, shape.flaps);
-    damp_enclosed_volume(organ.material.damping, shape);
+    damp(organ.material.damping, shape, shape.volumes);
+    if (shape.enclosed.stiffness > 0.0) damp_enclosed_volume(organ.material.damping, shape);
     for (const double m : shape.mass) shape.total_mass += m;
   }
 
   for (std::size_t v = 0; v < shape.mass.size(); ++v) {
-    shape.inverse_mass.push_back(shape.attached[v] ? 0.0 : 1.0 / shape.mass[v]);
+    const bool moves = shape.mass[v] > 0.0 && !shape.attached[v];
+    shape.inverse_mass.push_back(moves ? 1.0 / shape.mass[v] : 0.0);
   }
   if (shape.elastic()) {
-    shape.stable_substep = stable_substep(shape, safety);
+    shape.fastest_frequency = fastest_frequency(shape);
+    // Stiffness-proportional: what moves at the fastest frequency is damped by the ratio, slower motion by less.
+    if (!shape.tetrahedra.empty()) shape.damping_time = 2.0 * organ.material.damping / shape.fastest_frequency;
+    shape.stable_substep = stable_substep(shape, is_solid(organ.model) ? solid_safety : surface_safety);
     shape.stiffest_element = stiffest_element(shape, shape.positions);
   }
   return shape;

@@ -36,6 +36,29 @@ void add_product(const std::vector<Kind>& elements, double Element<Kind::size>::
   }
 }
 
+void add_row_sums(const std::vector<NeoHookeanElement>& tetrahedra, const std::vector<Vector3>& positions,
+                  std::vector<double>& sums) {
+  for (const NeoHookeanElement& element : tetrahedra) {
+    const NeoHookeanElement::Vectors x = gather(element, positions);
+    for (std::size_t i = 0; i < 4; ++i) {
+      for (std::size_t j = 0; j < 4; ++j) sums[element.vertices[i]] += element.block(x, i, j).norm();
+    }
+  }
+}
+
+/// y += stiffness x of tetrahedra at rest: V (mu (H + H^T) + lambda tr H) g_i, H the gradient of x.
+void add_product(const std::vector<NeoHookeanElement>& tetrahedra, const std::vector<Vector3>& x,
+                 std::vector<Vector3>& y) {
+  for (const NeoHookeanElement& element : tetrahedra) {
+    const Matrix3 h = element.deformation_gradient(gather(element, x));
+    Matrix3 stress = element.moduli.mu * (h + h.transpose());
+    stress.diagonal().array() += element.moduli.lambda * h.trace();
+    const Matrix3 pull = element.volume * stress * element.inverse_rest.transpose();
+    for (int i = 0; i < 3; ++i) y[element.vertices[static_cast<std::size_t>(i) + 1]] += pull.col(i);
+    y[element.vertices[0]] -= pull.col(0) + pull.col(1) + pull.col(2);
+  }
+}
+
 /// The largest eigenvalue of M^-1/2 A M^-1/2, where product(x, y) adds A x to y.
 template <class Product>
 double largest_eigenvalue(const RestShape& shape, Product&& product) {
@@ -90,21 +113,22 @@ double stiffest_of(const std::vector<Kind>& elements, const RestShape& shape, co
 
 double stiffest_element(const RestShape& shape, const std::vector<Vector3>& positions) {
   return std::max({stiffest_of(shape.distances, shape, positions), stiffest_of(shape.areas, shape, positions),
-                   stiffest_of(shape.flaps, shape, positions)});
+                   stiffest_of(shape.volumes, shape, positions)});
 }
 
 void apply_mass_floor(double fraction, RestShape& shape) {
   std::vector<double> sums(shape.positions.size(), 0.0);
   add_row_sums(shape.distances, shape.positions, sums);
   add_row_sums(shape.areas, shape.positions, sums);
-  add_row_sums(shape.flaps, shape.positions, sums);
+  add_row_sums(shape.volumes, shape.positions, sums);
+  add_row_sums(shape.tetrahedra, shape.positions, sums);
 
   double total = 0.0;
   double fastest = 0.0;
   for (std::size_t i = 0; i < sums.size(); ++i) {
     if (shape.attached[i]) sums[i] = 0.0;  // never moves
     total += shape.mass[i];
-    fastest = std::max(fastest, sums[i] / shape.mass[i]);
+    if (shape.mass[i] > 0.0) fastest = std::max(fastest, sums[i] / shape.mass[i]);
   }
   const auto added_at = [&](double bound) {
     double added = 0.0;
@@ -126,27 +150,46 @@ void apply_mass_floor(double fraction, RestShape& shape) {
   }
 }
 
-double stable_substep(const RestShape& shape, double safety) {
-  std::vector<Vector3> enclosed_gradient(shape.positions.size());
-  if (shape.enclosed.stiffness > 0.0) shape.enclosed.evaluate(shape.positions, shape.triangles, enclosed_gradient);
-  const auto add_enclosed = [&](double factor, const std::vector<Vector3>& x, std::vector<Vector3>& y) {
-    if (!(factor > 0.0)) return;
-    double along = 0.0;
-    for (std::size_t i = 0; i < x.size(); ++i) along += enclosed_gradient[i].dot(x[i]);
-    for (std::size_t i = 0; i < x.size(); ++i) y[i] += factor * along * enclosed_gradient[i];
-  };
-  const double omega_squared = largest_eigenvalue(shape, [&](const std::vector<Vector3>& x, std::vector<Vector3>& y) {
+namespace {
+
+/// y += factor (gradient . x) gradient, of the enclosed volume.
+void add_enclosed(double factor, const std::vector<Vector3>& gradient, const std::vector<Vector3>& x,
+                  std::vector<Vector3>& y) {
+  if (!(factor > 0.0)) return;
+  double along = 0.0;
+  for (std::size_t i = 0; i < x.size(); ++i) along += gradient[i].dot(x[i]);
+  for (std::size_t i = 0; i < x.size(); ++i) y[i] += factor * along * gradient[i];
+}
+
+std::vector<Vector3> enclosed_gradient(const RestShape& shape) {
+  std::vector<Vector3> gradient(shape.positions.size());
+  if (shape.enclosed.stiffness > 0.0) shape.enclosed.evaluate(shape.positions, shape.triangles, gradient);
+  return gradient;
+}
+
+}  // namespace
+
+double fastest_frequency(const RestShape& shape) {
+  const std::vector<Vector3> gradient = enclosed_gradient(shape);
+  return std::sqrt(largest_eigenvalue(shape, [&](const std::vector<Vector3>& x, std::vector<Vector3>& y) {
     add_product(shape.distances, &DistanceElement::stiffness, shape, x, y);
     add_product(shape.areas, &AreaElement::stiffness, shape, x, y);
-    add_product(shape.flaps, &VolumeElement::stiffness, shape, x, y);
-    add_enclosed(shape.enclosed.stiffness, x, y);
-  });
-  const double lambda = largest_eigenvalue(shape, [&](const std::vector<Vector3>& x, std::vector<Vector3>& y) {
-    add_product(shape.distances, &DistanceElement::damping, shape, x, y);
-    add_product(shape.areas, &AreaElement::damping, shape, x, y);
-    add_product(shape.flaps, &VolumeElement::damping, shape, x, y);
-    add_enclosed(shape.enclosed.damping, x, y);
-  });
+    add_product(shape.volumes, &VolumeElement::stiffness, shape, x, y);
+    add_product(shape.tetrahedra, x, y);
+    add_enclosed(shape.enclosed.stiffness, gradient, x, y);
+  }));
+}
+
+double stable_substep(const RestShape& shape, double safety) {
+  const double omega_squared = std::pow(shape.fastest_frequency, 2);
+  const std::vector<Vector3> gradient = enclosed_gradient(shape);
+  const double lambda = shape.damping_time * omega_squared +
+                        largest_eigenvalue(shape, [&](const std::vector<Vector3>& x, std::vector<Vector3>& y) {
+                          add_product(shape.distances, &DistanceElement::damping, shape, x, y);
+                          add_product(shape.areas, &AreaElement::damping, shape, x, y);
+                          add_product(shape.volumes, &VolumeElement::damping, shape, x, y);
+                          add_enclosed(shape.enclosed.damping, gradient, x, y);
+                        });
 
   const double a = omega_squared / (4.0 * safety * safety);
   const double b = lambda / (2.0 * safety);

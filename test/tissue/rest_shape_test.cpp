@@ -106,7 +106,7 @@ class Lattice : public testing::Test {
   double bending(const RestShape& shape, const std::function<Vector3(const Vector3&)>& map) const {
     std::vector<Vector3> x;
     for (const Vector3& p : shape.positions) x.push_back(map(p));
-    return energy_where<VolumeElement>(shape.flaps, x,
+    return energy_where<VolumeElement>(shape.volumes, x,
                                        [&](const VolumeElement& e) { return in_cell(e.vertices[0], e.vertices[1]); }) /
            cell_area;
   }
@@ -165,7 +165,7 @@ TEST(RestShape, ASphereBlownUpStoresTheEnergyOfAMembrane) {
     for (Vector3& p : x) p *= 1.0 + strain;
     const double membrane = 4.0 * pi * 0.05 * 0.05 * 10e3 * thickness / (1.0 - 0.45) * strain * strain;
     EXPECT_NEAR((energy(shape.distances, x) + energy(shape.areas, x)) / membrane, 1.0, 0.03);  // measured: 0.997, 0.987
-    EXPECT_LT(energy(shape.flaps, x), 0.01 * membrane);
+    EXPECT_LT(energy(shape.volumes, x), 0.01 * membrane);
 
     std::vector<Vector3> gradient(x.size());
     const double c = shape.enclosed.evaluate(x, shape.triangles, gradient);
@@ -187,7 +187,7 @@ TEST(RestShape, RestsWithoutEnergy) {
   const RestShape shape = build_rest_shape(wall_of(make_torus(0.05, 0.02, 12)));
   EXPECT_EQ(energy(shape.distances, shape.positions), 0.0);
   EXPECT_EQ(energy(shape.areas, shape.positions), 0.0);
-  EXPECT_EQ(energy(shape.flaps, shape.positions), 0.0);
+  EXPECT_EQ(energy(shape.volumes, shape.positions), 0.0);
   std::vector<Vector3> gradient(shape.positions.size());
   EXPECT_NEAR(shape.enclosed.evaluate(shape.positions, shape.triangles, gradient), 0.0, 1e-13);
 }
@@ -195,15 +195,15 @@ TEST(RestShape, RestsWithoutEnergy) {
 TEST(RestShape, FlatFacesGiveFiniteFlaps) {
   // On a gridded box most flaps have no volume at all, by which Eq. 8 divides.
   const RestShape shape = build_rest_shape(wall_of(make_grid_box({0.04, 0.05, 0.06}, 4)));
-  ASSERT_EQ(shape.flaps.size(), shape.topology.edges.size());
+  ASSERT_EQ(shape.volumes.size(), shape.topology.edges.size());
   std::size_t flat = 0;
-  for (const VolumeElement& flap : shape.flaps) {
+  for (const VolumeElement& flap : shape.volumes) {
     flat += std::abs(flap.rest) < 1e-18 ? 1 : 0;
     EXPECT_GT(flap.scale, 0.0);
     EXPECT_TRUE(std::isfinite(flap.stiffness) && std::isfinite(flap.damping));
     EXPECT_GT(flap.stiffness, 0.0);
   }
-  EXPECT_GT(flat, shape.flaps.size() / 2);
+  EXPECT_GT(flat, shape.volumes.size() / 2);
 }
 
 TEST(RestShape, ShortEdgesAndSmallTrianglesAreFloored) {
@@ -227,7 +227,7 @@ TEST(RestShape, ContactOnlyPaysForNoElements) {
   organ.model = Model::contact_only;
   const RestShape shape = build_rest_shape(organ);
   EXPECT_FALSE(shape.elastic());
-  EXPECT_TRUE(shape.areas.empty() && shape.flaps.empty());
+  EXPECT_TRUE(shape.areas.empty() && shape.volumes.empty());
   EXPECT_EQ(shape.stable_substep, 0.0);
   for (const double m : shape.inverse_mass) EXPECT_EQ(m, 1.0);
 }

@@ -51,7 +51,7 @@ double fastest(const RestShape& shape, const std::vector<double>& mass) {
   std::vector<double> sums(mass.size(), 0.0);
   add_row_sums(shape.distances, shape.positions, sums);
   add_row_sums(shape.areas, shape.positions, sums);
-  add_row_sums(shape.flaps, shape.positions, sums);
+  add_row_sums(shape.volumes, shape.positions, sums);
   double bound = 0.0;
   for (std::size_t i = 0; i < mass.size(); ++i) {
     if (!shape.attached[i]) bound = std::max(bound, sums[i] / mass[i]);
@@ -76,7 +76,7 @@ struct Motion {
     double energy = 0.0;
     for (const DistanceElement& e : shape.distances) energy += add_forces(e, {shape.inverse_mass, 1e300}, x, v, forces);
     for (const AreaElement& e : shape.areas) energy += add_forces(e, {shape.inverse_mass, 1e300}, x, v, forces);
-    for (const VolumeElement& e : shape.flaps) energy += add_forces(e, {shape.inverse_mass, 1e300}, x, v, forces);
+    for (const VolumeElement& e : shape.volumes) energy += add_forces(e, {shape.inverse_mass, 1e300}, x, v, forces);
     const double c = shape.enclosed.evaluate(x, shape.triangles, gradient);
     energy += 0.5 * shape.enclosed.stiffness * c * c;
     double rate = 0.0;
@@ -125,7 +125,7 @@ TEST(MassFloor, BringsTheRaisedToOneBound) {
   std::vector<double> sums(bare.size(), 0.0);
   add_row_sums(shape.distances, shape.positions, sums);
   add_row_sums(shape.areas, shape.positions, sums);
-  add_row_sums(shape.flaps, shape.positions, sums);
+  add_row_sums(shape.volumes, shape.positions, sums);
   const double bound = fastest(shape, shape.mass);
   int raised = 0;
   for (std::size_t i = 0; i < bare.size(); ++i) {

@@ -4,27 +4,45 @@
 #include <vector>
 
 #include "tissue_sim/contact/penetration.h"
+#include "tissue_sim/geometry/embedding.h"
 
 namespace tissue_sim {
 
+/// The simulated vertices that a place of the surface moves with, and how much with each: x = sum w_i x_i. The corners
+/// of its triangle, or, where the surface is embedded in a solid, those of the tetrahedra around its corners.
+struct Bearers {
+  static constexpr int most = 12;
+  int count = 0;
+  std::array<int, most> vertices{};
+  std::array<double, most> weights{};
+
+  /// A vertex that bears already bears more.
+  void add(int vertex, double weight);
+};
+
 /// A point of an organ's surface and the plane of the instrument that it must not be behind: direction . x >= target.
-/// x is the weighted sum of up to three vertices: one for a colliding vertex, two for a point of an edge.
 struct ContactPoint {
   int piece = 0;     ///< of the world's instrument pieces
-  int triangle = 0;  ///< of the organ; the vertices are its corners in the order of the weights
-  std::array<int, 3> vertices{};
-  Vector3 weights = Vector3::UnitX();
+  int triangle = 0;  ///< of the organ
+  Vector3 weights = Vector3::UnitX();  ///< of the triangle's corners: one is 1 for a colliding vertex
+  Bearers bearers;
   Vector3 direction = Vector3::UnitZ();           ///< scene frame, unit, out of the instrument
   double target = 0.0;                            ///< m
   Vector3 instrument_velocity = Vector3::Zero();  ///< m/s, of the instrument at the point
   double impulse = 0.0;                           ///< N s along direction, on the organ; set by the response
+  double force = 0.0;                             ///< N along direction, on the organ; see bear_forces
+  double stiffness = 0.0;                         ///< N/m, of the implicit integrator; see descend
 };
 
 /// Position, velocity or any other vector at the point, from those of all vertices.
 inline Vector3 at_point(const ContactPoint& point, const std::vector<Vector3>& of_vertices) {
-  return point.weights[0] * of_vertices[point.vertices[0]] + point.weights[1] * of_vertices[point.vertices[1]] +
-         point.weights[2] * of_vertices[point.vertices[2]];
+  Vector3 sum = Vector3::Zero();
+  for (int i = 0; i < point.bearers.count; ++i) sum += point.bearers.weights[i] * of_vertices[point.bearers.vertices[i]];
+  return sum;
 }
+
+/// Of points that were found on a surface that is embedded in a solid: lets the solid's vertices bear them.
+void bear_by(const Embedding& embedding, const std::vector<Triangle>& triangles, std::vector<ContactPoint>& points);
 
 /// m; what touches an instrument within this distance goes on touching, and points of triangles are kept this far out.
 constexpr double contact_margin = 0.02e-3;

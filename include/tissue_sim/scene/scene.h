@@ -5,13 +5,14 @@
 #include <vector>
 
 #include "tissue_sim/geometry/pose.h"
-#include "tissue_sim/geometry/triangle_mesh.h"
+#include "tissue_sim/geometry/tetrahedral_mesh.h"
 
 namespace tissue_sim {
 
 enum class Model { contact_only, surface, volume, fem };
 enum class CollidingSet { flood, paper };  ///< how the vertices inside the instrument are found (doc/contact.md)
 enum class DepthScheme { exact, paper };   ///< closest point on the instrument, or Eq. 1-6
+enum class Integrator { automatic, explicit_substeps, vertex_block_descent };
 
 /// SI units. What a model does not use may be left out of the scene file and is then zero here.
 struct Material {
@@ -26,13 +27,18 @@ struct Material {
 struct Organ {
   std::string name;
   TriangleMesh mesh;  ///< scene frame, metres; closed, manifold, outward
+  /// The solid of `volume` and `fem`, else empty. Its first vertices are those of `mesh`, unless `embedded`.
+  TetrahedralMesh solid;
+  bool embedded = false;  ///< `mesh` is not the solid's own surface: it is carried by the tetrahedra around it
   Model model = Model::surface;
+  Integrator integrator = Integrator::automatic;
   bool restoration = true;  ///< false: plastic, what the instrument moved stays moved
   CollidingSet colliding_set = CollidingSet::flood;
   DepthScheme depth = DepthScheme::exact;
   Material material;
   double wall_thickness = 0.0;  ///< m, `surface` only
-  std::vector<int> attached;    ///< vertices held at their rest place, ascending
+  /// Vertices held at their rest place, ascending: of `solid` where there is one, else of `mesh`.
+  std::vector<int> attached;
 };
 
 /// One rigid piece of an instrument: the collision shape of a URDF link.
@@ -68,5 +74,10 @@ class SceneError : public std::runtime_error {
 const char* to_string(Model model);
 const char* to_string(CollidingSet set);
 const char* to_string(DepthScheme depth);
+const char* to_string(Integrator integrator);
+
+inline bool is_solid(Model model) {
+  return model == Model::volume || model == Model::fem;
+}
 
 }  // namespace tissue_sim

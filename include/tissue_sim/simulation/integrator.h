@@ -8,14 +8,23 @@ namespace tissue_sim {
 /// integrated.
 int substeps_for(const RestShape& rest, double duration);
 
-/// Writes the forces (N) of all elements on all vertices. Returns the elastic energy (J). `gradient` is room for the
-/// enclosed volume's.
-double element_forces(const RestShape& rest, const OrganState& state, std::vector<Vector3>& forces,
-                      std::vector<Vector3>& gradient);
+/// Room for element_forces(), one entry a vertex; empty where the organ's elements need none.
+struct ElementRoom {
+  std::vector<Vector3> gradient;               ///< of the enclosed volume
+  std::vector<Eigen::Vector4f> displacements;  ///< m, of tetrahedra
+  std::vector<Eigen::Vector4f> forces;         ///< N, of tetrahedra
+};
+void prepare(ElementRoom& room, const RestShape& rest);
 
-/// One explicit (symplectic) substep of dt (s): v += dt (f/m + g), slowed by the drag, then x += dt v. Attached and
-/// held vertices stay. Returns the largest speed of a vertex that moved, m/s.
-double integrate(const OrganModel& organ, const Vector3& gravity, double dt, const std::vector<Vector3>& forces,
-                 OrganState& state);
+/// Writes the forces (N) of all elements, damping included, on all vertices.
+void element_forces(const RestShape& rest, const OrganState& state, std::vector<Vector3>& forces, ElementRoom& room);
+
+/// The first half of an explicit (symplectic) substep of dt (s): v += dt (f/m + g), slowed by the drag. Attached and held
+/// vertices stay.
+void accelerate(const OrganModel& organ, const Vector3& gravity, double dt, const std::vector<Vector3>& forces,
+                OrganState& state);
+
+/// The second half: x += dt v. Returns the largest speed of a vertex that moved, m/s.
+double advance(const OrganModel& organ, double dt, OrganState& state);
 
 }  // namespace tissue_sim

@@ -36,6 +36,7 @@ void find_border_depths(StepContext& context);
 void propagate_depths(StepContext& context);
 void respond(StepContext& context);
 void deform(StepContext& context);
+void bear(StepContext& context);
 
 /// Puts the last good state of the organ back, at rest, when a number is not finite or a vertex has run away.
 void check_health(StepContext& context);

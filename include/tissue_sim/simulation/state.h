@@ -9,16 +9,23 @@
 
 namespace tissue_sim {
 
+/// The force (N) that vertex block descent found at a place of contact in the last substep.
+struct PlaceForce {
+  std::size_t place = 0;
+  double force = 0.0;
+};
+
 /// What a step changes of one organ, and all that the next step reads of it.
 struct OrganState {
-  std::vector<Vector3> positions;            ///< m, scene frame
+  std::vector<Vector3> positions;            ///< m, scene frame, in the order of the rest shape's
   std::vector<Vector3> velocities;           ///< m/s
   std::vector<Vector3> forces;               ///< N, of the elements in the last substep
-  std::vector<double> depths;                ///< m, 0 where no instrument presses
+  std::vector<double> depths;                ///< m, one a surface vertex, 0 where no instrument presses
   std::vector<char> held;                    ///< 1: moved by an instrument and left there (restoration off)
   std::vector<std::vector<char>> colliding;  ///< per piece, one a vertex: the paper's memory; empty for the flood
   std::vector<std::vector<int>> touching;    ///< per piece: vertices that were in contact in the last substep
   std::vector<Clearance> clearances;         ///< per piece
+  std::vector<PlaceForce> pressing;          ///< vertex block descent starts from them
   bool asleep = true;                        ///< at rest and untouched: nothing to integrate
 };
 

@@ -3,8 +3,10 @@
 #include <vector>
 
 #include "tissue_sim/contact/contact_point.h"
+#include "tissue_sim/simulation/integrator.h"
 #include "tissue_sim/simulation/state.h"
 #include "tissue_sim/simulation/step_report.h"
+#include "tissue_sim/simulation/vertex_block_descent.h"
 
 namespace tissue_sim {
 
@@ -32,7 +34,10 @@ struct OrganWorkspace {
   std::vector<Penetration> penetrations;  ///< per piece
   std::vector<char> near;                 ///< per piece: its box and the organ's overlap in this substep
   std::vector<ContactPoint> points;
-  std::vector<Vector3> gradient;
+  ElementRoom elements;
+  std::vector<Vector3> accelerations;
+  std::vector<double> force_of;  ///< N, per place; 0 between two uses
+  DescentRoom descent;
   OrganState last_good;
 
   std::vector<OrganContact> contacts;  ///< of the step, one a place that was pressed in any of its substeps

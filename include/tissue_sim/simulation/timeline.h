@@ -28,10 +28,22 @@ struct TimelineCounters {
   std::uint64_t resets = 0;
 };
 
-/// What an organ shows. Arrays have one entry a vertex.
+/// Part of an array that somebody else owns.
+template <class Item>
+struct Span {
+  const Item* first = nullptr;
+  std::size_t count = 0;
+
+  const Item* begin() const { return first; }
+  const Item* end() const { return first + count; }
+  std::size_t size() const { return count; }
+  const Item& operator[](std::size_t i) const { return first[i]; }
+};
+
+/// What an organ shows, one entry a vertex of its surface. Valid until the next step.
 struct OrganView {
-  const std::vector<Vector3>& positions;  ///< m, scene frame
-  const std::vector<double>& depths;      ///< m, 0 where the instrument does not press
+  Span<Vector3> positions;  ///< m, scene frame
+  Span<double> depths;      ///< m, 0 where the instrument does not press
 };
 
 /// What will be modelled of one organ, and what it takes.

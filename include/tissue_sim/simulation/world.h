@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "tissue_sim/contact/instrument_surface.h"
@@ -8,6 +9,15 @@
 
 namespace tissue_sim {
 
+/// The elements at each vertex, by kind: an item is the element's index times the kind's size, plus the vertex's corner.
+struct Incidence {
+  FlatLists distances;
+  FlatLists areas;
+  FlatLists volumes;
+  FlatLists tetrahedra;
+  std::vector<double> stiffness;  ///< N/m, per vertex, its own at rest
+};
+
 /// An organ as the step sees it. Never changes after the load.
 struct OrganModel {
   RestShape rest;
@@ -15,6 +25,9 @@ struct OrganModel {
   CollidingSet colliding_set = CollidingSet::flood;
   DepthScheme depth = DepthScheme::exact;
   double drag = 0.0;                     ///< 1/s
+  Integrator integrator = Integrator::explicit_substeps;  ///< never automatic
+  std::string integrator_reason;
+  Incidence incidence;                   ///< for vertex block descent, else empty
   std::vector<std::vector<int>> poking;  ///< per piece: its vertices that may poke into a triangle of this organ
   double motion_limit = 0.0;             ///< m, the farthest an instrument may move between two contact passes
 };

@@ -7,11 +7,14 @@
 
 namespace tissue_sim {
 
+using Matrix3 = Eigen::Matrix3d;
+
 /// A piece of tissue that stores energy: E = 1/2 k C^2 with a dimensionless constraint C of its vertices' positions.
 /// Force on vertex i: -(k C + d dC/dt) grad_i C. The second part is the damping of Teschner et al. 2004: it acts along
 /// the constraint only, so it never slows a rigid motion.
 ///
-/// Each kind adds `evaluate(x, gradient)`, which returns C and writes its gradient (1/m) at every vertex.
+/// Each kind adds `evaluate(x, gradient)`, which returns C and writes its gradient (1/m) at every vertex, and
+/// `block(x, corner)`, the second derivative of its energy by one vertex's position (N/m), positive semi-definite.
 template <std::size_t size_>
 struct Element {
   static constexpr std::size_t size = size_;

@@ -20,6 +20,12 @@ inline LameModuli lame_moduli(double young, double poisson) {
   return {young / (2.0 * (1.0 + poisson)), young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson))};
 }
 
+/// What one vertex sees of an energy: its gradient (N) and second derivative (N/m).
+struct LocalStiffness {
+  Vector3 gradient = Vector3::Zero();
+  Matrix3 block = Matrix3::Zero();
+};
+
 /// A linear tetrahedron of stable neo-Hookean tissue, total Lagrangian (Smith, de Goes and Kim, "Stable Neo-Hookean
 /// Flesh Simulation", 2018, without the logarithm of their last form): with the deformation gradient F, its determinant
 /// J and L = lambda + mu,
@@ -81,14 +87,22 @@ struct NeoHookeanElement {
     return volume * (0.5 * moduli.mu * (f.squaredNorm() - 3.0) - moduli.mu * stretch + 0.5 * stiff * stretch * stretch);
   }
 
-  /// Second derivative of the energy by one corner's position, N/m: V (mu |g|^2 1 + L (C g)(C g)^T), g its shape
-  /// gradient and C the cofactors of F. Positive definite.
-  Matrix3 block(const Vectors& x, std::size_t corner) const {
+  /// What one corner sees. Its block is V (mu |g|^2 1 + L (C g)(C g)^T), g its shape gradient and C the cofactors of F:
+  /// positive definite.
+  LocalStiffness local(const Vectors& x, std::size_t corner) const {
+    const Matrix3 f = deformation_gradient(x);
+    const Matrix3 c = cofactors(f);
     const Vector3 g = shape_gradient(corner);
-    const Vector3 cg = cofactors(deformation_gradient(x)) * g;
-    return volume * (moduli.mu * g.squaredNorm() * Matrix3::Identity() +
-                     (moduli.lambda + moduli.mu) * cg * cg.transpose());
+    const Vector3 cg = c * g;
+    const double stretch = f.col(0).dot(c.col(0)) - 1.0;
+    const double stiff = moduli.lambda + moduli.mu;
+    LocalStiffness result;
+    result.gradient = volume * (moduli.mu * (f * g) + (stiff * stretch - moduli.mu) * cg);
+    result.block = volume * stiff * cg * cg.transpose();
+    result.block.diagonal().array() += volume * moduli.mu * g.squaredNorm();
+    return result;
   }
+  Matrix3 block(const Vectors& x, std::size_t corner) const { return local(x, corner).block; }
 
   /// Second derivative of the energy by corners i (rows) and j (columns), N/m. Exact, so not always positive definite.
   Matrix3 block(const Vectors& x, std::size_t i, std::size_t j) const {

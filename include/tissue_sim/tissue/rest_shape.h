@@ -2,10 +2,12 @@
 
 #include <vector>
 
+#include "tissue_sim/geometry/embedding.h"
 #include "tissue_sim/scene/scene.h"
 #include "tissue_sim/tissue/area.h"
 #include "tissue_sim/tissue/distance.h"
 #include "tissue_sim/tissue/enclosed_volume.h"
+#include "tissue_sim/tissue/neo_hookean_batch.h"
 #include "tissue_sim/tissue/volume.h"
 
 namespace tissue_sim {
@@ -13,7 +15,12 @@ namespace tissue_sim {
 /// What is known of an organ before anything moves: topology, rest measures, masses, elements. Built once, never
 /// changed.
 struct RestShape {
+  /// m, scene frame. First the surface's vertices, which contact works on. Behind them the inner vertices of a solid; or,
+  /// where the surface is embedded, all vertices of the solid that carries it.
   std::vector<Vector3> positions;
+  int surface_vertices = 0;
+  int first_simulated = 0;  ///< the vertices before it are carried: without mass, moved by `embedding`
+  Embedding embedding;      ///< one entry a carried vertex, corners into `positions`
   std::vector<Triangle> triangles;
   MeshTopology topology;
   std::vector<int> component_roots;  ///< the first vertex of each connected surface
@@ -28,15 +35,22 @@ struct RestShape {
 
   std::vector<DistanceElement> distances;
   std::vector<AreaElement> areas;
-  std::vector<VolumeElement> flaps;
+  std::vector<VolumeElement> volumes;         ///< flaps of a wall, tetrahedra of a solid
+  std::vector<NeoHookeanElement> tetrahedra;  ///< `fem`
+  NeoHookeanSolid packed;                     ///< the same tetrahedra for the explicit integrator, else empty
   EnclosedVolume enclosed;
-  double stable_substep = 0.0;    ///< s; 0: nothing to integrate
+  double damping_time = 0.0;       ///< s, of the tetrahedra: their forces are those of positions + damping_time velocities
+  double fastest_frequency = 0.0;  ///< rad/s, undamped, at rest
+  double stable_substep = 0.0;     ///< s; 0: nothing to integrate
   double stiffest_element = 0.0;  ///< 1/s^2, see stiffest_element()
 
-  bool elastic() const { return !distances.empty(); }
+  bool elastic() const { return !distances.empty() || !tetrahedra.empty(); }
 };
 
 /// Builds what the organ's model asks for, and no more.
 RestShape build_rest_shape(const Organ& organ);
+
+/// Puts the carried vertices where their bearers are. Returns the farthest way of one, m.
+double carry_surface(const RestShape& shape, std::vector<Vector3>& positions);
 
 }  // namespace tissue_sim

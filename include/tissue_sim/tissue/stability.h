@@ -9,9 +9,12 @@ namespace tissue_sim {
 /// (Gershgorin); the lowest common bound on omega_i that the fraction pays for is found and met.
 void apply_mass_floor(double fraction, RestShape& shape);
 
+/// The largest frequency (rad/s) at which the organ can vibrate, undamped, taken at rest by power iteration.
+double fastest_frequency(const RestShape& shape);
+
 /// The substep (s) at which the explicit integrator stays stable, `safety` times the bound. Stability of the symplectic
 /// step needs (dt omega / 2)^2 + dt lambda / 2 < 1, where omega^2 and lambda are the largest eigenvalues of stiffness
-/// and damping over mass, taken at rest by power iteration.
+/// and damping over mass, taken at rest by power iteration; omega is the shape's `fastest_frequency`.
 double stable_substep(const RestShape& shape, double safety);
 
 /// The largest k sum |grad_i C|^2 / m_i of an element at the given positions, 1/s^2: the square of the frequency at

@@ -21,6 +21,13 @@ struct VolumeElement : Element<4> {
     gradient[0] = -(gradient[1] + gradient[2] + gradient[3]);
     return (a.dot(b.cross(c)) / 6.0 - rest) / scale;
   }
+
+  /// Second derivative of the energy by one corner's position, N/m: k g g^T, exact, since the volume is linear in it.
+  Matrix3 block(const ElementVectors<VolumeElement>& x, std::size_t corner) const {
+    ElementVectors<VolumeElement> gradient;
+    evaluate(x, gradient);
+    return stiffness * gradient[corner] * gradient[corner].transpose();
+  }
 };
 
 }  // namespace tissue_sim

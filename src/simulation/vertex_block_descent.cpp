@@ -1,0 +1,296 @@
+#include "tissue_sim/simulation/vertex_block_descent.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tissue_sim {
+
+namespace {
+
+/// s; one sweep a millisecond is exact at rest and leaves a few percent in motion.
+constexpr double sweep_period = 1e-3;
+
+/// How much stiffer than the vertices that bear it a shared contact point is held. A much stiffer one would lock its
+/// vertices in the places where the first sweep put them.
+constexpr double shared_stiffness = 2.0;
+
+template <class Kind>
+FlatLists corners_of(const std::vector<Kind>& elements, std::size_t vertices) {
+  FlatLists lists;
+  lists.first.assign(vertices + 1, 0);
+  for (const Kind& element : elements) {
+    for (const int vertex : element.vertices) ++lists.first[vertex + 1];
+  }
+  for (std::size_t v = 0; v < vertices; ++v) lists.first[v + 1] += lists.first[v];
+  lists.items.resize(static_cast<std::size_t>(lists.first.back()));
+  std::vector<int> next(lists.first.begin(), lists.first.end() - 1);
+  int item = 0;
+  for (const Kind& element : elements) {
+    for (const int vertex : element.vertices) lists.items[next[vertex]++] = item++;
+  }
+  return lists;
+}
+
+/// Constraint elements at vertex v. Damped along their gradient by what all their vertices moved since the start.
+template <class Kind>
+void add_elements(const std::vector<Kind>& elements, const FlatLists& at, int v, const std::vector<Vector3>& positions,
+                  const std::vector<Vector3>& start, double dt, LocalStiffness& local) {
+  ElementVectors<Kind> gradient;
+  for (const int* item = at.begin(v); item != at.end(v); ++item) {
+    const std::size_t corner = static_cast<std::size_t>(*item) % Kind::size;
+    const Kind& element = elements[static_cast<std::size_t>(*item) / Kind::size];
+    const ElementVectors<Kind> x = gather(element, positions);
+    const double c = element.evaluate(x, gradient);
+    double moved = 0.0;
+    for (std::size_t i = 0; i < Kind::size; ++i) moved += gradient[i].dot(x[i] - start[element.vertices[i]]);
+    const double slowed = element.damping / dt;
+    local.gradient += (element.stiffness * c + slowed * moved) * gradient[corner];
+    local.block += element.block(x, corner) + slowed * gradient[corner] * gradient[corner].transpose();
+  }
+}
+
+void add_tetrahedra(const RestShape& rest, const FlatLists& at, int v, const std::vector<Vector3>& damped, double dt,
+                    LocalStiffness& local) {
+  const double implied = 1.0 + rest.damping_time / dt;
+  for (const int* item = at.begin(v); item != at.end(v); ++item) {
+    const std::size_t corner = static_cast<std::size_t>(*item) % 4;
+    const NeoHookeanElement& element = rest.tetrahedra[static_cast<std::size_t>(*item) / 4];
+    const LocalStiffness at_corner = element.local(gather(element, damped), corner);
+    local.gradient += at_corner.gradient;
+    local.block += implied * at_corner.block;
+  }
+}
+
+/// Gradient of the enclosed volume's constraint by one vertex, 1/m: the triangles around it.
+Vector3 enclosed_gradient(const RestShape& rest, int v, const std::vector<Vector3>& positions) {
+  Vector3 sum = Vector3::Zero();
+  const FlatLists& triangles = rest.topology.vertex_triangles;
+  for (const int* t = triangles.begin(v); t != triangles.end(v); ++t) {
+    const Triangle& corners = rest.triangles[*t];
+    const int i = corners[0] == v ? 0 : corners[1] == v ? 1 : 2;
+    sum += (positions[corners[(i + 1) % 3]] - positions[v]).cross(positions[corners[(i + 2) % 3]] - positions[v]);
+  }
+  return sum / (6.0 * rest.enclosed.rest);
+}
+
+/// One step of one organ: what all of its vertices share while they are swept over.
+class Descent {
+ public:
+  Descent(const OrganModel& organ, double dt, std::vector<ContactPoint>& points, OrganState& state, DescentRoom& room)
+      : organ_(organ), dt_(dt), points_(points), state_(state), room_(room) {}
+
+  void start(const Vector3& gravity);
+  void sweep();
+  double finish();
+
+ private:
+  const RestShape& rest() const { return organ_.rest; }
+  bool moves(int v) const { return rest().inverse_mass[v] > 0.0 && !state_.held[v]; }
+  double inertia(int v) const { return (1.0 + dt_ * organ_.drag) / (dt_ * dt_ * rest().inverse_mass[v]); }
+  void place(int v, const Vector3& position);
+  LocalStiffness look_around(int v) const;
+  double push(const ContactPoint& point, double weight, const Vector3& step) const;
+  Vector3 free_step(int v, LocalStiffness& local, Matrix3& inverse);
+  Vector3 stop_step(int v, const Matrix3& inverse, Vector3 step);
+
+  const OrganModel& organ_;
+  const double dt_;
+  std::vector<ContactPoint>& points_;
+  OrganState& state_;
+  DescentRoom& room_;
+  double enclosed_ = 0.0;  ///< the enclosed volume's constraint, kept up with every vertex that moves
+  double enclosed_at_start_ = 0.0;
+};
+
+void Descent::start(const Vector3& gravity) {
+  room_.start = state_.positions;
+  room_.damped = state_.positions;
+  if (rest().enclosed.stiffness > 0.0) {
+    enclosed_at_start_ = rest().enclosed.evaluate(state_.positions, rest().triangles, room_.inertial);
+    enclosed_ = enclosed_at_start_;
+  }
+  const double slowed = 1.0 / (1.0 + dt_ * organ_.drag);
+  const int vertices = static_cast<int>(state_.positions.size());
+  for (int v = rest().first_simulated; v < vertices; ++v) {
+    if (!moves(v)) continue;
+    room_.inertial[v] = state_.positions[v] + slowed * dt_ * (state_.velocities[v] + dt_ * gravity);
+  }
+  // From where the vertices are on their way to, not from where they are: else one sweep a step is all drag, and takes
+  // ten times as long to come to rest. Only now, since a place belongs to its neighbours' volumes too.
+  for (int v = rest().first_simulated; v < vertices; ++v) {
+    if (moves(v)) place(v, state_.positions[v] + slowed * dt_ * state_.velocities[v]);
+  }
+
+  room_.pressing.clear();
+  for (std::size_t p = 0; p < points_.size(); ++p) {
+    ContactPoint& point = points_[p];
+    double yielding = 0.0;  // of the point: m/N
+    for (int i = 0; i < point.bearers.count; ++i) {
+      const int v = point.bearers.vertices[i];
+      if (!moves(v)) continue;
+      yielding += std::pow(point.bearers.weights[i], 2) / (organ_.incidence.stiffness[v] + inertia(v));
+      room_.pressing.push_back({static_cast<int>(p), point.bearers.weights[i], room_.first_of[v], false});
+      room_.first_of[v] = static_cast<int>(room_.pressing.size()) - 1;
+    }
+    point.stiffness = yielding > 0.0 ? shared_stiffness / yielding : 0.0;
+  }
+}
+
+void Descent::place(int v, const Vector3& position) {
+  if (rest().enclosed.stiffness > 0.0) {
+    enclosed_ += enclosed_gradient(rest(), v, state_.positions).dot(position - state_.positions[v]);
+  }
+  state_.positions[v] = position;
+  room_.damped[v] = position + rest().damping_time / dt_ * (position - room_.start[v]);
+}
+
+LocalStiffness Descent::look_around(int v) const {
+  LocalStiffness local;
+  const Incidence& at = organ_.incidence;
+  add_elements(rest().distances, at.distances, v, state_.positions, room_.start, dt_, local);
+  add_elements(rest().areas, at.areas, v, state_.positions, room_.start, dt_, local);
+  add_elements(rest().volumes, at.volumes, v, state_.positions, room_.start, dt_, local);
+  add_tetrahedra(rest(), at.tetrahedra, v, room_.damped, dt_, local);
+  if (rest().enclosed.stiffness > 0.0) {
+    const EnclosedVolume& enclosed = rest().enclosed;
+    const Vector3 gradient = enclosed_gradient(rest(), v, state_.positions);
+    const double slowed = enclosed.damping / dt_;
+    local.gradient += (enclosed.stiffness * enclosed_ + slowed * (enclosed_ - enclosed_at_start_)) * gradient;
+    local.block += (enclosed.stiffness + slowed) * gradient * gradient.transpose();
+  }
+  return local;
+}
+
+/// N, along the point's direction, when one of its vertices has gone by `step` with `weight`.
+double Descent::push(const ContactPoint& point, double weight, const Vector3& step) const {
+  const double behind = point.target - point.direction.dot(at_point(point, state_.positions) + weight * step);
+  return std::max(0.0, point.force + point.stiffness * behind);
+}
+
+/// The step that takes the vertex to the minimum of its local energy, contact points that it shares with others
+/// included as soon as they press at its beginning or at its end.
+Vector3 Descent::free_step(int v, LocalStiffness& local, Matrix3& inverse) {
+  Vector3 step = Vector3::Zero();
+  for (int round = 0; round < 2; ++round) {
+    bool pressed = round == 0;
+    for (int i = room_.first_of[v]; i >= 0; i = room_.pressing[i].next) {
+      DescentRoom::Pressing& pressing = room_.pressing[i];
+      const ContactPoint& point = points_[pressing.point];
+      if (point.bearers.count == 1 || (round > 0 && pressing.active)) continue;
+      pressing.active = push(point, pressing.weight, step) > 0.0;
+      if (!pressing.active) continue;
+      const double behind = point.target - point.direction.dot(at_point(point, state_.positions));
+      local.gradient -= pressing.weight * (point.force + point.stiffness * behind) * point.direction;
+      local.block += std::pow(pressing.weight, 2) * point.stiffness * point.direction * point.direction.transpose();
+      pressed = true;
+    }
+    if (!pressed) break;
+    inverse = local.block.inverse();
+    step = -(inverse * local.gradient);
+  }
+  return step;
+}
+
+/// Contact points that the vertex bears alone are met exactly: the lowest local energy in front of the instrument.
+Vector3 Descent::stop_step(int v, const Matrix3& inverse, Vector3 step) {
+  for (int i = room_.first_of[v]; i >= 0; i = room_.pressing[i].next) {
+    ContactPoint& point = points_[room_.pressing[i].point];
+    if (point.bearers.count != 1) continue;
+    const double behind = point.target - point.direction.dot(state_.positions[v] + step);
+    const Vector3 along = inverse * point.direction;
+    point.force = std::max(0.0, behind / point.direction.dot(along));
+    step += point.force * along;
+  }
+  return step;
+}
+
+void Descent::sweep() {
+  const int vertices = static_cast<int>(state_.positions.size());
+  for (int v = rest().first_simulated; v < vertices; ++v) {
+    if (!moves(v)) continue;
+    LocalStiffness local = look_around(v);
+    local.gradient += inertia(v) * (state_.positions[v] - room_.inertial[v]);
+    local.block.diagonal().array() += inertia(v);
+    Matrix3 inverse;
+    const Vector3 step = free_step(v, local, inverse);
+    place(v, state_.positions[v] + stop_step(v, inverse, step));
+  }
+  for (ContactPoint& point : points_) {
+    if (point.bearers.count > 1) point.force = push(point, 0.0, Vector3::Zero());
+  }
+}
+
+double Descent::finish() {
+  double fastest = 0.0;
+  const int vertices = static_cast<int>(state_.positions.size());
+  for (int v = rest().first_simulated; v < vertices; ++v) {
+    room_.first_of[v] = -1;
+    if (rest().attached[v]) continue;
+    state_.velocities[v] = (state_.positions[v] - room_.start[v]) / dt_;
+    fastest = std::max(fastest, state_.velocities[v].squaredNorm());
+  }
+  return std::sqrt(fastest);
+}
+
+/// The stiffness (N/m) that a vertex meets on its own at rest: a third of the trace of its block.
+std::vector<double> vertex_stiffness(const RestShape& rest, const Incidence& incidence) {
+  std::vector<double> stiffness(rest.positions.size(), 0.0);
+  for (std::size_t i = 0; i < stiffness.size(); ++i) {
+    const int v = static_cast<int>(i);
+    LocalStiffness local;
+    add_elements(rest.distances, incidence.distances, v, rest.positions, rest.positions, 1.0, local);
+    add_elements(rest.areas, incidence.areas, v, rest.positions, rest.positions, 1.0, local);
+    add_elements(rest.volumes, incidence.volumes, v, rest.positions, rest.positions, 1.0, local);
+    add_tetrahedra(rest, incidence.tetrahedra, v, rest.positions, 1.0, local);
+    stiffness[i] = local.block.trace() / 3.0;
+  }
+  return stiffness;
+}
+
+}  // namespace
+
+Incidence build_incidence(const RestShape& rest) {
+  const std::size_t vertices = rest.positions.size();
+  Incidence incidence;
+  incidence.distances = corners_of(rest.distances, vertices);
+  incidence.areas = corners_of(rest.areas, vertices);
+  incidence.volumes = corners_of(rest.volumes, vertices);
+  incidence.tetrahedra = corners_of(rest.tetrahedra, vertices);
+  incidence.stiffness = vertex_stiffness(rest, incidence);
+  return incidence;
+}
+
+void prepare(DescentRoom& room, const RestShape& rest) {
+  room.start = rest.positions;
+  room.inertial = rest.positions;
+  room.damped = rest.positions;
+  room.first_of.assign(rest.positions.size(), -1);
+}
+
+double descend(const OrganModel& organ, const Vector3& gravity, double dt, std::vector<ContactPoint>& points,
+               OrganState& state, DescentRoom& room) {
+  Descent descent(organ, dt, points, state, room);
+  descent.start(gravity);
+  const int sweeps = std::max(1, static_cast<int>(std::ceil(dt / sweep_period - 1e-9)));
+  for (int i = 0; i < sweeps; ++i) descent.sweep();
+  return descent.finish();
+}
+
+void bearing_forces(const OrganModel& organ, const std::vector<ContactPoint>& points, const OrganState& state,
+                    std::vector<Vector3>& forces) {
+  const Incidence& at = organ.incidence;
+  const RestShape& rest = organ.rest;
+  for (const ContactPoint& point : points) {
+    for (int i = 0; i < point.bearers.count; ++i) {
+      const int v = point.bearers.vertices[i];
+      LocalStiffness local;
+      add_elements(rest.distances, at.distances, v, state.positions, state.positions, 1.0, local);
+      add_elements(rest.areas, at.areas, v, state.positions, state.positions, 1.0, local);
+      add_elements(rest.volumes, at.volumes, v, state.positions, state.positions, 1.0, local);
+      add_tetrahedra(rest, at.tetrahedra, v, state.positions, 1.0, local);
+      forces[v] = -local.gradient;
+    }
+  }
+}
+
+}  // namespace tissue_sim
