@@ -128,6 +128,24 @@ TEST(Reference, AFlatPlateIsAGuidedEnd) {
   EXPECT_NEAR(solution.contact_force.z(), force, 1e-6 * force);
 }
 
+TEST(Reference, ATwistIsTheSameAtOnceAndInSteps) {
+  Bar bar(0.0);
+  const Matrix3 turn = Eigen::AngleAxisd(2.0, Vector3::UnitZ()).toRotationMatrix();
+  for (std::size_t v = 0; v < bar.mesh.vertices.size(); ++v) {
+    const Vector3& p = bar.mesh.vertices[v];
+    const bool end = p.z() == 0.0 || p.z() < -0.0399;
+    bar.problem.fixed[v] = {end, end, end};
+    if (p.z() == 0.0) bar.problem.prescribed[v] = turn * p - p;
+  }
+  ReferenceOptions options;
+  const ReferenceSolution at_once = solve_statics(bar.problem, options);
+  options.load_steps = 8;
+  const ReferenceSolution in_steps = solve_statics(bar.problem, options);
+  EXPECT_TRUE(at_once.converged);
+  EXPECT_TRUE(in_steps.converged);
+  EXPECT_LT(largest_distance(at_once.positions, in_steps.positions), 1e-9);
+}
+
 TEST(Reference, NothingMovesWithoutALoad) {
   const Bar bar(0.0);
   const ReferenceSolution solution = solve_statics(bar.problem);
