@@ -100,11 +100,44 @@ Pose read_organ_pose(const YamlMapping& organ, const Frames& frames, const std::
   return frames.at(parent) * read_pose(yaml);
 }
 
+Accuracy read_accuracy(const YamlMapping& scene) {
+  Accuracy accuracy;
+  if (!scene.has("accuracy")) return accuracy;
+  const YamlMapping yaml = scene.mapping("accuracy", {"budget_ms", "error"});
+  yaml.require_one_of({"budget_ms", "error"});
+  if (yaml.has("budget_ms")) {
+    accuracy.goal = Accuracy::Goal::budget;
+    accuracy.value = 1e-3 * yaml.number("budget_ms", above_zero, "a number above 0, in milliseconds a step");
+    accuracy.place = yaml.place("budget_ms");
+  } else {
+    accuracy.goal = Accuracy::Goal::error;
+    accuracy.value = yaml.fraction("error");
+    accuracy.place = yaml.place("error");
+  }
+  return accuracy;
+}
+
 Model read_model(const YamlMapping& organ) {
+  if (!organ.has("model")) {
+    organ.fail("model",
+               "is missing, add it (contact_only, surface, volume, fem), or give the scene an "
+               "accuracy: {budget_ms: 1} that chooses it");
+  }
   return organ.choice<Model>("model", {{"contact_only", Model::contact_only},
                                        {"surface", Model::surface},
                                        {"volume", Model::volume},
                                        {"fem", Model::fem}});
+}
+
+/// What an organ that names no model could be, as far as its keys tell.
+std::vector<Model> possible_models(const YamlMapping& organ) {
+  std::vector<Model> models = {Model::contact_only};
+  if (organ.has("wall_thickness")) models.push_back(Model::surface);
+  if (organ.has("solid") || is_tetrahedral_mesh(organ.text("mesh"))) {
+    models.push_back(Model::volume);
+    models.push_back(Model::fem);
+  }
+  return models;
 }
 
 /// What a model's energies reach of Poisson's ratio.
@@ -118,18 +151,18 @@ PoissonRange poisson_range(Model model) {
     case Model::fem:
       return {0.0, "a number from 0 to below 0.5"};
     case Model::volume:
-      return {smallest_volume_poisson, "a number from 0.25 to below 0.5: distances and volumes reach no other, fem does"};
+      return {smallest_volume_poisson,
+              "a number from 0.25 to below 0.5: distances and volumes reach no other, fem does"};
     default:
       return {smallest_wall_poisson,
               "a number from 1/3 (write 0.3334) to below 0.5: the energies of a wall reach no other"};
   }
 }
 
-Material read_material(const YamlMapping& organ, Model model) {
+Material read_material(const YamlMapping& organ, const PoissonRange& range) {
   const YamlMapping yaml = organ.mapping("material", {"young", "poisson", "density", "damping", "drag"});
   Material material;
   material.young = yaml.number("young", above_zero, "a number above 0, in Pa (liver 5400, stomach wall 200000)");
-  const PoissonRange range = poisson_range(model);
   material.poisson = yaml.number(
       "poisson", [&](double x) { return x >= range.least && x < 0.5; }, range.allowed);
   material.density = yaml.number("density", above_zero, "a number above 0, in kg/m^3 (soft tissue 1060)");
@@ -178,10 +211,11 @@ std::vector<int> read_attachments(const YamlMapping& organ, const std::vector<Ve
   return {attached.begin(), attached.end()};
 }
 
-/// What `load` makes of the file that a key names; the key's place stands before all that it throws and warns.
+/// What `load` makes of the file that a key names by `reference`; the key's place stands before all that it throws and
+/// warns.
 template <typename Load>
-auto load_from(const YamlMapping& yaml, const std::string& key, std::vector<std::string>& warnings, Load load) {
-  const std::string reference = yaml.text(key);
+auto load_from(const YamlMapping& yaml, const std::string& key, const std::string& reference,
+               std::vector<std::string>& warnings, Load load) {
   std::vector<std::string> said;
   try {
     auto loaded = load(resolve_path(reference, yaml.file()), said);
@@ -193,10 +227,9 @@ auto load_from(const YamlMapping& yaml, const std::string& key, std::vector<std:
 }
 
 /// The command that makes the solid that is missing, for the message that misses it.
-std::string make_solid_command(const Organ& organ, const std::string& surface, double scale) {
-  const MeshTopology topology =
-      build_topology(static_cast<int>(organ.mesh.vertices.size()), organ.mesh.triangles);
-  const double edge = 1e3 * mean_edge_length(organ.mesh.vertices, topology.edges);
+std::string make_solid_command(const TriangleMesh& mesh, const std::string& surface, double scale) {
+  const MeshTopology topology = build_topology(static_cast<int>(mesh.vertices.size()), mesh.triangles);
+  const double edge = 1e3 * mean_edge_length(mesh.vertices, topology.edges);
   const std::string out = surface.substr(0, surface.rfind('.')) + ".msh";
   std::ostringstream command;
   command << "scripts/make_solid " << surface << " " << out << " --edge " << std::setprecision(2) << edge;
@@ -204,52 +237,80 @@ std::string make_solid_command(const Organ& organ, const std::string& surface, d
   return command.str();
 }
 
-/// The surface, and for a solid organ its tetrahedra: those of `mesh`, or those of `solid` that carry the surface.
-void read_shape(const YamlMapping& yaml, double scale, std::vector<std::string>& warnings, Organ& organ) {
-  using Warnings = std::vector<std::string>;
-  std::string surface;
-  organ.mesh = load_from(yaml, "mesh", warnings, [&](const std::string& path, Warnings& said) {
-    surface = path;
-    if (!is_tetrahedral_mesh(path)) return load_organ_mesh(path, scale, said);
-    organ.solid = read_tetrahedral_mesh(path, scale, said);
-    sort_vertices_for_locality(organ.solid);
-    TriangleMesh mesh = take_surface(organ.solid);
-    sort_for_locality(organ.solid);
-    return mesh;
-  });
-  if (!is_solid(organ.model)) {
-    if (yaml.has("solid")) yaml.fail("solid", "is used by the models volume and fem only, delete it");
-    organ.solid = TetrahedralMesh();
-    return;
-  }
-  if (!yaml.has("solid")) {
-    if (!organ.solid.empty()) return;
-    yaml.fail("mesh", std::string("is a surface, and model ") + to_string(organ.model) +
-                          " needs a solid: name the file that this command makes: " +
-                          make_solid_command(organ, surface, scale));
-  }
-  if (!organ.solid.empty()) yaml.fail("solid", "stands beside a mesh that is a solid itself, delete one of them");
-  organ.embedded = true;
-  organ.solid = load_from(yaml, "solid", warnings, [&](const std::string& path, Warnings& said) {
-    TetrahedralMesh solid = read_tetrahedral_mesh(path, scale, said);
-    sort_vertices_for_locality(solid);
-    sort_for_locality(solid);
-    return solid;
-  });
-  const double outside = embed(organ.mesh.vertices, organ.solid).farthest_outside;
-  const MeshTopology topology = build_topology(static_cast<int>(organ.mesh.vertices.size()), organ.mesh.triangles);
-  const double allowed = farthest_outside * mean_edge_length(organ.mesh.vertices, topology.edges);
-  if (outside > allowed) {
-    yaml.fail("solid", "leaves vertices of the mesh " + metres(outside) + " outside, allowed are " + metres(allowed) +
-                           ": is it made from this mesh? " + make_solid_command(organ, surface, scale));
-  }
+/// Tetrahedra for an organ.
+struct Solid {
+  TetrahedralMesh mesh;
+  std::string file;       ///< as the scene file names it
+  bool embedded = false;  ///< see Organ::embedded
+};
+
+/// What the files of an organ hold.
+struct Shape {
+  TriangleMesh surface;
+  std::vector<Solid> solids;
+  std::string path;  ///< of the file of the surface
+};
+
+/// Refuses a solid that does not hold the surface which it is to carry.
+void check_carried(const YamlMapping& yaml, const Shape& shape, const Solid& solid, double scale) {
+  const TriangleMesh& mesh = shape.surface;
+  const double outside = embed(mesh.vertices, solid.mesh).farthest_outside;
+  const MeshTopology topology = build_topology(static_cast<int>(mesh.vertices.size()), mesh.triangles);
+  const double allowed = farthest_outside * mean_edge_length(mesh.vertices, topology.edges);
+  if (outside <= allowed) return;
+  yaml.fail("solid", "leaves vertices of the mesh " + metres(outside) + " outside, allowed are " + metres(allowed) +
+                         ": is '" + solid.file + "' made from this mesh? " +
+                         make_solid_command(mesh, shape.path, scale));
 }
 
-/// All of an organ, its mesh still in its own frame and nothing attached.
-Organ read_organ(const YamlMapping& yaml, std::vector<std::string>& warnings) {
+/// The surface, and the solids: the one whose surface it is, or those that `solids` names, which carry it.
+Shape read_shape(const YamlMapping& yaml, double scale, const std::vector<std::string>& solids,
+                 std::vector<std::string>& warnings) {
+  using Warnings = std::vector<std::string>;
+  Shape shape;
+  const std::string mesh = yaml.text("mesh");
+  shape.surface = load_from(yaml, "mesh", mesh, warnings, [&](const std::string& path, Warnings& said) {
+    shape.path = path;
+    if (!is_tetrahedral_mesh(path)) return load_organ_mesh(path, scale, said);
+    Solid solid = {read_tetrahedral_mesh(path, scale, said), mesh, false};
+    sort_vertices_for_locality(solid.mesh);
+    TriangleMesh surface = take_surface(solid.mesh);
+    sort_for_locality(solid.mesh);
+    shape.solids.push_back(std::move(solid));
+    return surface;
+  });
+  if (!solids.empty() && !shape.solids.empty()) {
+    yaml.fail("solid", "stands beside a mesh that is a solid itself, delete one of them");
+  }
+  for (const std::string& file : solids) {
+    Solid solid = {{}, file, true};
+    solid.mesh = load_from(yaml, "solid", file, warnings, [&](const std::string& path, Warnings& said) {
+      TetrahedralMesh read = read_tetrahedral_mesh(path, scale, said);
+      sort_vertices_for_locality(read);
+      sort_for_locality(read);
+      return read;
+    });
+    check_carried(yaml, shape, solid, scale);
+    shape.solids.push_back(std::move(solid));
+  }
+  return shape;
+}
+
+/// The solid that a model which the scene file names works on.
+std::vector<std::string> named_solids(const YamlMapping& yaml, Model model) {
+  if (!yaml.has("solid")) return {};
+  if (!is_solid(model)) yaml.fail("solid", "is used by the models volume and fem only, delete it");
+  if (yaml.is_list("solid")) {
+    yaml.fail("solid", std::string("is a list, from which the scene's accuracy would choose, but model is ") +
+                           to_string(model) + ": name one file, or delete model");
+  }
+  return {yaml.text("solid")};
+}
+
+/// What all models of an organ share.
+Organ read_common(const YamlMapping& yaml) {
   Organ organ;
   organ.name = yaml.name("name");
-  organ.model = read_model(yaml);
   organ.restoration = yaml.flag("restoration", true);
   organ.colliding_set = yaml.choice<CollidingSet>(
       "colliding_set", {{"flood", CollidingSet::flood}, {"paper", CollidingSet::paper}}, CollidingSet::flood);
@@ -260,16 +321,79 @@ Organ read_organ(const YamlMapping& yaml, std::vector<std::string>& warnings) {
                                               {"explicit", Integrator::explicit_substeps},
                                               {"vertex_block_descent", Integrator::vertex_block_descent}},
                                              Integrator::automatic);
+  return organ;
+}
+
+double read_scale(const YamlMapping& yaml) {
+  return yaml.number("scale", above_zero, "a number above 0: file units to metres, 0.001 for millimetres");
+}
+
+double read_wall(const YamlMapping& yaml) {
+  return yaml.number("wall_thickness", above_zero, "a number above 0, in metres");
+}
+
+/// An organ that names its model; its mesh still in its own frame and nothing attached.
+Alternative read_named(const YamlMapping& yaml, std::vector<std::string>& warnings) {
+  Alternative read = {read_common(yaml), ""};
+  Organ& organ = read.organ;
+  organ.model = read_model(yaml);
   if (organ.model == Model::surface) {
-    organ.wall_thickness = yaml.number("wall_thickness", above_zero, "a number above 0, in metres");
+    organ.wall_thickness = read_wall(yaml);
   } else if (yaml.has("wall_thickness")) {
     yaml.fail("wall_thickness", "is used by the model surface only, delete it");
   }
-  if (organ.model != Model::contact_only || yaml.has("material")) organ.material = read_material(yaml, organ.model);
-  const double scale =
-      yaml.number("scale", above_zero, "a number above 0: file units to metres, 0.001 for millimetres");
-  read_shape(yaml, scale, warnings, organ);
-  return organ;
+  if (organ.model != Model::contact_only || yaml.has("material")) {
+    organ.material = read_material(yaml, poisson_range(organ.model));
+  }
+  const double scale = read_scale(yaml);
+  Shape shape = read_shape(yaml, scale, named_solids(yaml, organ.model), warnings);
+  organ.mesh = std::move(shape.surface);
+  if (!is_solid(organ.model)) return read;
+  if (shape.solids.empty()) {
+    yaml.fail("mesh", std::string("is a surface, and model ") + to_string(organ.model) +
+                          " needs a solid: name the file that this command makes: " +
+                          make_solid_command(organ.mesh, shape.path, scale));
+  }
+  organ.solid = std::move(shape.solids[0].mesh);
+  organ.embedded = shape.solids[0].embedded;
+  read.solid = shape.solids[0].file;
+  return read;
+}
+
+/// The ways to model an organ that names no model: contact_only, surface if it has a wall, and volume and fem on each
+/// of its solids; of these what its Poisson's ratio allows.
+std::vector<Alternative> read_alternatives(const YamlMapping& yaml, std::vector<std::string>& warnings) {
+  const Organ common = read_common(yaml);
+  const std::vector<Model> models = possible_models(yaml);
+  const bool wall = yaml.has("wall_thickness");
+  const double thickness = wall ? read_wall(yaml) : 0.0;
+  Material material;
+  if (models.size() > 1 || yaml.has("material")) material = read_material(yaml, poisson_range(models.back()));
+  const double scale = read_scale(yaml);
+  const Shape shape =
+      read_shape(yaml, scale, yaml.has("solid") ? yaml.texts("solid") : std::vector<std::string>(), warnings);
+
+  std::vector<Alternative> alternatives;
+  for (const Model model : models) {
+    if (model != Model::contact_only && material.poisson < poisson_range(model).least) {
+      warnings.push_back(yaml.place("model") + "accuracy does without " + to_string(model) + ", whose poisson is " +
+                         poisson_range(model).allowed);
+      continue;
+    }
+    Organ organ = common;
+    organ.model = model;
+    organ.mesh = shape.surface;
+    organ.material = material;
+    if (model == Model::surface) organ.wall_thickness = thickness;
+    if (!is_solid(model)) alternatives.push_back({organ, ""});
+    for (const Solid& solid : shape.solids) {
+      if (!is_solid(model)) break;
+      organ.solid = solid.mesh;
+      organ.embedded = solid.embedded;
+      alternatives.push_back({organ, solid.file});
+    }
+  }
+  return alternatives;
 }
 
 /// Attaches an organ and carries it into the scene's frame.
@@ -295,9 +419,10 @@ Instrument read_instrument(const YamlMapping& yaml, std::vector<std::string>& wa
       topic.back() == '/' || topic == "~") {
     yaml.fail("pose_topic", "is '" + topic + "', allowed is the name of a ROS topic such as PSM1/measured_cp");
   }
-  instrument.parts = load_from(yaml, "urdf", warnings, [&](const std::string& path, std::vector<std::string>& said) {
+  const auto load = [&](const std::string& path, std::vector<std::string>& said) {
     return load_instrument(path, instrument.tip_link, said);
-  });
+  };
+  instrument.parts = load_from(yaml, "urdf", yaml.text("urdf"), warnings, load);
   return instrument;
 }
 
@@ -339,13 +464,15 @@ void check_sizes(const Scene& scene, const std::vector<YamlMapping>& organs) {
 }  // namespace
 
 Scene load_scene(const std::string& path, std::vector<std::string>& warnings) {
-  const YamlMapping yaml(path, {"frame", "gravity", "time_step", "max_substeps", "frames", "organs", "instruments"});
+  const YamlMapping yaml(
+      path, {"frame", "gravity", "time_step", "max_substeps", "accuracy", "frames", "organs", "instruments"});
   Scene scene;
   scene.frame = yaml.name("frame");
   scene.gravity = yaml.vector("gravity", Vector3::Zero());
   scene.time_step = yaml.number(
       "time_step", [](double x) { return x > 0.0 && x <= 0.1; }, "a number above 0 and at most 0.1, in seconds");
   scene.max_substeps = yaml.whole_number("max_substeps", 1, 10000, scene.max_substeps);
+  scene.accuracy = read_accuracy(yaml);
   const Frames frames = read_frames(yaml, scene.frame);
 
   const std::vector<YamlMapping> organs =
@@ -362,11 +489,21 @@ Scene load_scene(const std::string& path, std::vector<std::string>& warnings) {
       if (!names.insert(name).second) object.fail("name", "is '" + name + "' like another object, give each its own");
     }
   }
-  for (const YamlMapping& organ : organs) scene.organs.push_back(read_organ(organ, warnings));
+  const bool dial = scene.accuracy.goal != Accuracy::Goal::none;
+  for (const YamlMapping& organ : organs) {
+    const bool open = dial && !organ.has("model");
+    scene.alternatives.push_back(open ? read_alternatives(organ, warnings) : std::vector<Alternative>());
+    scene.organs.push_back(open ? scene.alternatives.back().front().organ : read_named(organ, warnings).organ);
+  }
   for (const YamlMapping& instrument : instruments) scene.instruments.push_back(read_instrument(instrument, warnings));
   check_sizes(scene, organs);
   for (std::size_t o = 0; o < organs.size(); ++o) {
-    place_organ(organs[o], read_organ_pose(organs[o], frames, scene.frame), scene.organs[o]);
+    const Pose pose = read_organ_pose(organs[o], frames, scene.frame);
+    place_organ(organs[o], pose, scene.organs[o]);
+    for (Alternative& alternative : scene.alternatives[o]) place_organ(organs[o], pose, alternative.organ);
+  }
+  if (dial && std::all_of(organs.begin(), organs.end(), [](const YamlMapping& organ) { return organ.has("model"); })) {
+    warnings.push_back(yaml.place("accuracy") + "chooses nothing, every organ names its model");
   }
   return scene;
 }

@@ -34,13 +34,23 @@ bool is_plain(const YAML::Node& node) {
 
 /// A finite decimal number and nothing else; NaN for everything else. yaml-cpp's own conversion takes .nan, .inf,
 /// hexadecimal and "1.0" in quotes.
-double to_number(const YAML::Node& node) {
+double to_number(const std::string& text) {
   double number = std::nan("");
-  if (!is_plain(node) || node.Scalar().find_first_not_of("0123456789.eE+-") != std::string::npos) return number;
-  std::istringstream stream(node.Scalar());
+  if (text.find_first_not_of("0123456789.eE+-") != std::string::npos) return number;
+  std::istringstream stream(text);
   stream.imbue(std::locale::classic());
   stream >> number;
   return stream && stream.eof() && std::isfinite(number) ? number : std::nan("");
+}
+
+double to_number(const YAML::Node& node) {
+  return is_plain(node) ? to_number(node.Scalar()) : std::nan("");
+}
+
+/// Neither a number nor true or false; those are texts in quotes only.
+bool is_text(const YAML::Node& node) {
+  if (!node.IsScalar() || node.Scalar().empty() || node.Scalar().find('\0') != std::string::npos) return false;
+  return !is_plain(node) || (node.Scalar() != "true" && node.Scalar() != "false" && std::isnan(to_number(node)));
 }
 
 /// Letters to insert, delete or replace on the way from a to b.
@@ -146,7 +156,7 @@ bool YamlMapping::has(const std::string& key) const {
 void YamlMapping::require_one_of(Keys keys) const {
   const auto there = std::count_if(keys.begin(), keys.end(), [&](const char* key) { return has(key); });
   if (there != 1) {
-    throw SceneError(at(file_, mark_) + path_ + ": has " + std::to_string(there) + " shapes, allowed is one of " +
+    throw SceneError(at(file_, mark_) + path_ + ": has " + std::to_string(there) + " of its keys, allowed is one of " +
                      join(keys));
   }
 }
@@ -190,12 +200,37 @@ Vector3 YamlMapping::vector(const std::string& key, const Vector3& otherwise) co
 
 std::string YamlMapping::text(const std::string& key) const {
   const YAML::Node& node = value(key);
-  const bool word = node.IsScalar() && !node.Scalar().empty() && node.Scalar().find('\0') == std::string::npos;
-  const bool other_type = is_plain(node) && (node.Scalar() == "true" || node.Scalar() == "false");
-  if (!word || other_type || (is_plain(node) && !std::isnan(to_number(node)))) {
+  if (!is_text(node)) {
     fail(key, "is " + shown(node) + ", allowed is a text (in quotes if it looks like a number)");
   }
   return node.Scalar();
+}
+
+std::vector<std::string> YamlMapping::texts(const std::string& key) const {
+  if (!is_list(key)) return {text(key)};
+  std::vector<std::string> found;
+  for (const auto& item : value(key)) {
+    if (!is_text(item)) fail(key, "holds " + shown(item) + ", allowed are a text and a list of texts");
+    if (std::count(found.begin(), found.end(), item.Scalar()) > 0) {
+      fail(key, "holds " + shown(item) + " twice, delete one");
+    }
+    found.push_back(item.Scalar());
+  }
+  if (found.empty()) fail(key, "is an empty list, allowed are a text and a list of texts");
+  return found;
+}
+
+bool YamlMapping::is_list(const std::string& key) const {
+  return has(key) && value(key).IsSequence();
+}
+
+double YamlMapping::fraction(const std::string& key) const {
+  const YAML::Node& node = value(key);
+  double fraction = to_number(node);
+  const std::string percent = node.IsScalar() ? node.Scalar() : "";
+  if (!percent.empty() && percent.back() == '%') fraction = 0.01 * to_number(percent.substr(0, percent.size() - 1));
+  if (fraction > 0.0 && fraction <= 1.0) return fraction;
+  fail(key, "is " + shown(node) + ", allowed is a part above 0% and at most 100%, such as 5% or 0.05");
 }
 
 std::string YamlMapping::name(const std::string& key) const {

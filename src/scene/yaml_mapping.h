@@ -35,7 +35,10 @@ class YamlMapping {
   Vector3 vector(const std::string& key) const;
   Vector3 vector(const std::string& key, const Vector3& otherwise) const;
   std::string text(const std::string& key) const;
-  std::string name(const std::string& key) const;  ///< a letter, then letters, digits and '_'
+  std::vector<std::string> texts(const std::string& key) const;  ///< a text, or a list of one or more, all different
+  bool is_list(const std::string& key) const;                    ///< false if left out
+  double fraction(const std::string& key) const;                 ///< `5%` or 0.05: above 0 and at most 1
+  std::string name(const std::string& key) const;                ///< a letter, then letters, digits and '_'
   YamlMapping mapping(const std::string& key, Keys known) const;
   std::vector<YamlMapping> list(const std::string& key, Keys known) const;  ///< empty if left out
 

@@ -16,6 +16,37 @@ std::int64_t in_nanoseconds(double seconds) {
   return static_cast<std::int64_t>(seconds / nanosecond + 0.5);
 }
 
+const Scene& with_models_chosen(const Scene& scene) {
+  for (std::size_t o = 0; o < scene.alternatives.size(); ++o) {
+    if (scene.alternatives[o].empty()) continue;
+    throw SceneError("organ " + scene.organs[o].name +
+                     ": its model is left to the scene's accuracy, choose_models() comes before the first step");
+  }
+  return scene;
+}
+
+template <class Item>
+std::size_t bytes(const std::vector<Item>& items) {
+  return items.size() * sizeof(Item);
+}
+
+std::size_t bytes(const FlatLists& lists) {
+  return bytes(lists.first) + bytes(lists.items);
+}
+
+std::size_t bytes(const RestShape& rest) {
+  return bytes(rest.positions) + bytes(rest.embedding.corners) + bytes(rest.embedding.weights) + bytes(rest.triangles) +
+         bytes(rest.topology.edges) + bytes(rest.topology.edge_triangles) + bytes(rest.topology.triangle_edges) +
+         bytes(rest.topology.vertex_edges) + bytes(rest.topology.vertex_triangles) + bytes(rest.attached) +
+         bytes(rest.mass) + bytes(rest.inverse_mass) + bytes(rest.distances) + bytes(rest.areas) + bytes(rest.volumes) +
+         bytes(rest.tetrahedra) + bytes(rest.packed.batches);
+}
+
+std::size_t bytes(const OrganState& state) {
+  return bytes(state.positions) + bytes(state.velocities) + bytes(state.forces) + bytes(state.depths) +
+         bytes(state.held);
+}
+
 /// The way from one stamp to the next, cut into steps that are equal to within a nanosecond.
 struct Segment {
   std::int64_t begin = 0;
@@ -37,7 +68,10 @@ struct Segment {
 
 struct Timeline::Impl {
   Impl(const Scene& scene, const TimelineOptions& given)
-      : world(build_world(scene)), options(given), workspace(build_workspace(world)), state(rest_state(world)) {
+      : world(build_world(with_models_chosen(scene))),
+        options(given),
+        workspace(build_workspace(world)),
+        state(rest_state(world)) {
     longest_step = in_nanoseconds(scene.time_step);
     tracks.resize(static_cast<std::size_t>(world.instruments));
     motion.instruments.resize(tracks.size());
@@ -241,18 +275,27 @@ OrganView Timeline::organ(int index) const {
 }
 
 OrganSummary Timeline::summary(int organ) const {
-  const RestShape& rest = impl_->world.organs[organ].rest;
+  const OrganModel& model = impl_->world.organs[organ];
+  const RestShape& rest = model.rest;
   OrganSummary summary;
   summary.vertices = rest.surface_vertices;
   summary.triangles = static_cast<int>(rest.triangles.size());
+  if (rest.elastic()) summary.simulated_vertices = static_cast<int>(rest.positions.size()) - rest.first_simulated;
+  summary.tetrahedra = static_cast<int>(rest.tetrahedra.size() + (rest.areas.empty() ? rest.volumes.size() : 0));
+  summary.embedded = rest.first_simulated > 0;
+  summary.plastic = rest.elastic() && !model.restoration;
   summary.attached = static_cast<int>(std::count(rest.attached.begin(), rest.attached.end(), 1));
   summary.distance_elements = static_cast<int>(rest.distances.size());
   summary.area_elements = static_cast<int>(rest.areas.size());
-  summary.volume_elements = static_cast<int>(rest.volumes.size()) + (rest.enclosed.stiffness > 0.0 ? 1 : 0);
+  summary.volume_elements = static_cast<int>(rest.volumes.size());
+  summary.enclosed_volume = rest.enclosed.stiffness > 0.0;
   summary.mass = rest.total_mass;
   summary.added_mass = rest.added_mass;
   summary.stable_substep = rest.stable_substep;
-  summary.substeps = substeps_for(rest, impl_->world.time_step);
+  summary.substeps = model.integrator == Integrator::explicit_substeps ? substeps_for(rest, impl_->world.time_step) : 1;
+  summary.integrator = model.integrator;
+  summary.integrator_reason = model.integrator_reason;
+  summary.memory = bytes(rest) + bytes(impl_->state.organs[organ]);
   return summary;
 }
 

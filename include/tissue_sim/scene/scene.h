@@ -56,6 +56,24 @@ struct Instrument {
   std::vector<InstrumentPart> parts;
 };
 
+/// What decides the models of the organs that name none: the dial between speed and accuracy.
+struct Accuracy {
+  enum class Goal {
+    none,    ///< every organ names its model
+    budget,  ///< the most accurate that costs at most `value` s a step, all organs together
+    error    ///< the cheapest whose measured error, relative, is at most `value`
+  };
+  Goal goal = Goal::none;
+  double value = 0.0;
+  std::string place;  ///< `file:line:column: key: ` of the goal, for errors about it
+};
+
+/// One of the ways to model an organ that names no model: all of the organ, as that model needs it.
+struct Alternative {
+  Organ organ;
+  std::string solid;  ///< the file of its tetrahedra as the scene file names it; empty without
+};
+
 struct Scene {
   std::string frame;
   Vector3 gravity = Vector3::Zero();  ///< m/s^2
@@ -63,6 +81,10 @@ struct Scene {
   int max_substeps = 100;             ///< a scene that needs more for one step is refused
   std::vector<Organ> organs;
   std::vector<Instrument> instruments;
+  Accuracy accuracy;
+  /// One list an organ, empty where the organ names its model. As long as there are any, choose_models() has the say:
+  /// such an organ is only the first of its alternatives, and a Timeline refuses the scene.
+  std::vector<std::vector<Alternative>> alternatives;
 };
 
 /// A scene that cannot be used. what() is one line: `file:line:column: key: what was wrong, what is allowed`.

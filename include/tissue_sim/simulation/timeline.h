@@ -50,14 +50,22 @@ struct OrganView {
 struct OrganSummary {
   int vertices = 0;
   int triangles = 0;
+  int simulated_vertices = 0;  ///< what is integrated: of the surface, of the solid; 0 for contact_only
+  int tetrahedra = 0;
+  bool embedded = false;  ///< the surface is carried by the tetrahedra
+  bool plastic = false;   ///< what the instrument moved stays moved
   int attached = 0;
   int distance_elements = 0;
   int area_elements = 0;
-  int volume_elements = 0;      ///< one a flap, and one for the whole organ
+  int volume_elements = 0;  ///< flaps of a wall, tetrahedra of a solid
+  bool enclosed_volume = false;
   double mass = 0.0;            ///< kg
   double added_mass = 0.0;      ///< kg, by the mass floor
   double stable_substep = 0.0;  ///< s; 0 where nothing is integrated
   int substeps = 1;             ///< in a step of the scene's time step, motion of the instruments aside
+  Integrator integrator = Integrator::explicit_substeps;  ///< never automatic
+  std::string integrator_reason;
+  std::size_t memory = 0;  ///< bytes of the rest shape and of the state
 };
 
 /// Stamped poses in, steps out: the time rules of the simulation, shared by the node and the replay.
@@ -67,7 +75,7 @@ struct OrganSummary {
 class Timeline {
  public:
   /// Throws SceneError, which names the organ and the time step or stiffness that would do, when a step would need
-  /// more than the scene's max_substeps.
+  /// more than the scene's max_substeps; and when the scene still leaves a model open (choose_models()).
   explicit Timeline(const Scene& scene, const TimelineOptions& options = {});
   ~Timeline();
 
