@@ -10,8 +10,8 @@ namespace {
 ContactPoint point_at(const std::array<int, 3>& vertices, const Vector3& weights, const Vector3& direction,
                       double target) {
   ContactPoint point;
-  point.vertices = vertices;
   point.weights = weights;
+  for (int i = 0; i < 3; ++i) point.bearers.add(vertices[i], weights[i]);
   point.direction = direction;
   point.target = target;
   return point;
@@ -20,9 +20,7 @@ ContactPoint point_at(const std::array<int, 3>& vertices, const Vector3& weights
 const std::vector<Vector3> corners = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
 
 double behind(const ContactPoint& point, const std::vector<Vector3>& x) {
-  double reached = 0.0;
-  for (int i = 0; i < 3; ++i) reached += point.weights[i] * point.direction.dot(x[point.vertices[i]]);
-  return point.target - reached;
+  return point.target - point.direction.dot(at_point(point, x));
 }
 
 Vector3 momentum(const std::vector<Vector3>& velocities, const std::vector<double>& inverse_mass) {
@@ -123,10 +121,18 @@ TEST(PushOut, TellsHowFarAVertexWentAtMost) {
   }
 }
 
+/// With every point where its target is: nothing to close, the instrument's own velocity counts.
+void stop(std::vector<ContactPoint>& points, const std::vector<double>& inverse_mass,
+          std::vector<Vector3>& velocities) {
+  const std::vector<Vector3> at_origin(velocities.size(), Vector3::Zero());
+  for (ContactPoint& point : points) point.target = 0.0;
+  stop_at_instrument(points, inverse_mass, at_origin, 1.0, velocities);
+}
+
 TEST(StopAtInstrument, AnInelasticStopTakesMassTimesVelocity) {
   std::vector<Vector3> v = {{0.5, 0, -3}, {0, 0, 0}, {0, 0, 0}};
   std::vector<ContactPoint> points = {point_at({0, 1, 2}, Vector3::UnitX(), Vector3::UnitZ(), 0.0)};
-  stop_at_instrument(points, {0.25, 1.0, 1.0}, v);  // 4 kg
+  stop(points, {0.25, 1.0, 1.0}, v);  // 4 kg
   EXPECT_DOUBLE_EQ(points[0].impulse, 12.0);
   EXPECT_LT((v[0] - Vector3(0.5, 0, 0)).norm(), 1e-15) << "without friction the rest goes on";
 }
@@ -135,7 +141,7 @@ TEST(StopAtInstrument, TakesTheInstrumentsVelocityAlongTheDirectionOnly) {
   std::vector<Vector3> v(3, Vector3::Zero());
   std::vector<ContactPoint> points = {point_at({0, 1, 2}, {0.2, 0.3, 0.5}, Vector3::UnitZ(), 0.0)};
   points[0].instrument_velocity = {7, 8, 2};
-  stop_at_instrument(points, {1.0, 1.0, 1.0}, v);
+  stop(points, {1.0, 1.0, 1.0}, v);
   EXPECT_NEAR(0.2 * v[0].z() + 0.3 * v[1].z() + 0.5 * v[2].z(), 2.0, 1e-14);
   for (const Vector3& velocity : v) EXPECT_EQ(velocity.head<2>(), Eigen::Vector2d(0, 0));
 }
@@ -145,7 +151,7 @@ TEST(StopAtInstrument, NeverPulls) {
   const std::vector<Vector3> before = v;
   std::vector<ContactPoint> points = {point_at({0, 1, 2}, {0.2, 0.3, 0.5}, Vector3::UnitZ(), 0.0)};
   points[0].impulse = 99.0;  // of the substep before
-  stop_at_instrument(points, {1.0, 1.0, 1.0}, v);
+  stop(points, {1.0, 1.0, 1.0}, v);
   EXPECT_EQ(points[0].impulse, 0.0);
   EXPECT_EQ(v, before);
 }
@@ -166,7 +172,7 @@ TEST(StopAtInstrument, ImpulsesAreTheChangeOfMomentum) {
       points.push_back(point_at(vertices, Vector3(0.3, 0.4, 0.3), random_direction(random), 0.0));
       points.back().instrument_velocity = random_point(random);
     }
-    stop_at_instrument(points, inverse_mass, v);
+    stop(points, inverse_mass, v);
     Vector3 impulses = Vector3::Zero();
     for (const ContactPoint& point : points) {
       EXPECT_GE(point.impulse, 0.0);
@@ -180,13 +186,13 @@ TEST(StopAtInstrument, AttachedVerticesTakeNoVelocity) {
   std::vector<Vector3> v(3, Vector3::Zero());
   std::vector<ContactPoint> points = {point_at({0, 1, 2}, {0.2, 0.3, 0.5}, Vector3::UnitZ(), 0.0)};
   points[0].instrument_velocity = {0, 0, 1};
-  stop_at_instrument(points, {0.0, 0.0, 1.0}, v);
+  stop(points, {0.0, 0.0, 1.0}, v);
   EXPECT_EQ(v[0], Vector3::Zero());
   EXPECT_EQ(v[1], Vector3::Zero());
   EXPECT_NEAR(0.5 * v[2].z(), 1.0, 1e-12);
 
   std::vector<Vector3> still(3, Vector3::Zero());
-  stop_at_instrument(points, {0.0, 0.0, 0.0}, still);
+  stop(points, {0.0, 0.0, 0.0}, still);
   EXPECT_EQ(points[0].impulse, 0.0);
   EXPECT_EQ(still, std::vector<Vector3>(3, Vector3::Zero()));
 }

@@ -155,8 +155,9 @@ TEST(Step, TheForceOfAHeldProbeIsThatOfTheElementsItHolds) {
   ASSERT_FALSE(report.contacts.empty());
 
   std::vector<Vector3> forces(simulation.organ().positions.size());
-  std::vector<Vector3> gradient(forces.size());
-  element_forces(simulation.rest(), simulation.organ(), forces, gradient);
+  ElementRoom room;
+  prepare(room, simulation.rest());
+  element_forces(simulation.rest(), simulation.organ(), forces, room);
   std::set<int> touched;
   Vector3 on_organ = Vector3::Zero();
   for (const OrganContact& contact : report.contacts) {
@@ -178,8 +179,9 @@ TEST(Step, TheAttachmentBearsWhatTheProbePresses) {
   Simulation simulation = pressed_sphere(0.008, 80);
   for (int i = 0; i < 3000; ++i) simulation.go_to(simulation.poses[0]);
   std::vector<Vector3> forces(simulation.organ().positions.size());
-  std::vector<Vector3> gradient(forces.size());
-  element_forces(simulation.rest(), simulation.organ(), forces, gradient);
+  ElementRoom room;
+  prepare(room, simulation.rest());
+  element_forces(simulation.rest(), simulation.organ(), forces, room);
   Vector3 borne = Vector3::Zero();
   for (std::size_t v = 0; v < forces.size(); ++v) {
     if (simulation.rest().attached[v]) borne += forces[v];

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -46,7 +47,9 @@ std::vector<std::int64_t> run(Timeline& timeline) {
 }
 
 bool at_rest(const Timeline& timeline, const Scene& scene) {
-  return timeline.organ(0).positions == scene.organs.front().mesh.vertices;
+  const OrganView organ = timeline.organ(0);
+  const std::vector<Vector3>& rest = scene.organs.front().mesh.vertices;
+  return std::equal(organ.positions.begin(), organ.positions.end(), rest.begin(), rest.end());
 }
 
 /// A ball pressed 10 mm into the sphere and back out, one pose every 5 ms.

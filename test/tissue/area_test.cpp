@@ -36,6 +36,15 @@ TEST(Area, OwesWhatEveryElementOwes) {
   expect_all_that_elements_owe<AreaElement>(0.4);
 }
 
+TEST(Area, BlocksBoundTheSecondDerivative) {
+  expect_blocks_bound_the_second_derivative<AreaElement>(0.4, false);
+}
+
+TEST(Area, WithoutAnyAreaItsBlockIsZero) {
+  const AreaElement e = element(0.5, 0.5);
+  EXPECT_TRUE(e.block({Vector3::Zero(), Vector3::UnitX(), Vector3(2, 0, 0)}, 0).isZero());
+}
+
 TEST(Area, WithoutAnyAreaItIsFinite) {
   for (const Vector3& third : {Vector3(0, 0, 0), Vector3(2, 0, 0), Vector3(0.5, 0, 0)}) {
     ElementVectors<AreaElement> gradient;

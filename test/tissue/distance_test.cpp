@@ -33,6 +33,18 @@ TEST(Distance, OwesWhatEveryElementOwes) {
   expect_all_that_elements_owe<DistanceElement>(0.8);
 }
 
+TEST(Distance, BlocksBoundTheSecondDerivative) {
+  expect_blocks_bound_the_second_derivative<DistanceElement>(0.8, false);
+}
+
+TEST(Distance, ABlockByHand) {
+  // 2 long at rest, stretched to 4 along y: k / 4 along it and half of that across. Shortened to 1: nothing across.
+  const DistanceElement e = element(2.0, 2.0);
+  EXPECT_TRUE(e.block({Vector3::Zero(), Vector3(0, 4, 0)}, 0).isApprox(Matrix3(Vector3(1, 2, 1).asDiagonal())));
+  EXPECT_TRUE(e.block({Vector3::Zero(), Vector3(0, 1, 0)}, 1).isApprox(Matrix3(Vector3(0, 2, 0).asDiagonal())));
+  EXPECT_TRUE(e.block({Vector3::Zero(), Vector3::Zero()}, 0).isZero());
+}
+
 TEST(Distance, EndsInOnePlaceAreFinite) {
   ElementVectors<DistanceElement> gradient;
   EXPECT_DOUBLE_EQ(element(2.0, 2.0).evaluate({Vector3::Ones(), Vector3::Ones()}, gradient), -1.0);

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
+
 #include "geometry/twins.h"
 #include "tissue_sim/tissue/element.h"
 
@@ -130,6 +132,62 @@ void expect_damping_takes_energy_out(double rest) {
     taken -= power;
   }
   EXPECT_GT(taken, 1.0);
+}
+
+/// Second derivative of the energy by one corner's position, by central differences.
+template <class Kind>
+Matrix3 second_difference(const Kind& element, std::vector<Vector3> x, std::size_t corner) {
+  constexpr double h = 1e-4;
+  const Vector3 at = x[corner];
+  const auto energy_off = [&](const Vector3& way) {
+    x[corner] = at + h * way;
+    return energy_of(element, x);
+  };
+  Matrix3 result;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      const Vector3 both = Vector3::Unit(i) + Vector3::Unit(j);
+      const Vector3 either = Vector3::Unit(i) - Vector3::Unit(j);
+      result(i, j) = (energy_off(both) - energy_off(either) - energy_off(-either) + energy_off(-both)) / (4.0 * h * h);
+    }
+  }
+  return result;
+}
+
+inline double smallest_eigenvalue(const Matrix3& symmetric) {
+  return Eigen::SelfAdjointEigenSolver<Matrix3>(symmetric, Eigen::EigenvaluesOnly).eigenvalues()[0];
+}
+
+/// A block never curves down, and is no less than the second derivative of the energy. Where the element is stretched,
+/// and everywhere if `always_exact`, it is that.
+template <class Kind>
+void expect_blocks_bound_the_second_derivative(double rest, bool always_exact) {
+  Random random(5);
+  int exact = 0;
+  int bounded = 0;
+  for (int round = 0; round < 300; ++round) {
+    const Kind element = random_element<Kind>(random, rest);
+    const std::vector<Vector3> x = random_corners<Kind>(random);
+    ElementVectors<Kind> gradient;
+    const double c = element.evaluate(gather(element, x), gradient);
+    if (std::abs(element.rest + c * element.scale) < 0.1) continue;  // too small for the differences
+    for (std::size_t corner = 0; corner < Kind::size; ++corner) {
+      const Matrix3 block = element.block(gather(element, x), corner);
+      const Matrix3 slope = second_difference(element, x, corner);
+      const double size = block.norm() + slope.norm();
+      EXPECT_LT((block - block.transpose()).norm(), 1e-15 * size);
+      EXPECT_GE(smallest_eigenvalue(block), -1e-14 * size);
+      if (always_exact || c > 0.0) {
+        ++exact;
+        EXPECT_LT((block - slope).norm(), 1e-5 * size);
+      } else {
+        ++bounded;
+        EXPECT_GE(smallest_eigenvalue(block - slope), -1e-5 * size);
+      }
+    }
+  }
+  EXPECT_GT(exact, 100);
+  EXPECT_EQ(bounded > 100, !always_exact);
 }
 
 template <class Kind>

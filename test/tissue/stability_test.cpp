@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
+
 #include "geometry/twins.h"
+#include "tissue/test_solids.h"
 #include "tissue_sim/geometry/primitives.h"
 
 namespace tissue_sim {
@@ -156,6 +159,8 @@ TEST(StableSubstep, OfOneSpringIsTheTextbooks) {
   spring.stiffness = 4.0;
   shape.distances = {spring};
   const double omega = std::sqrt(2.0 * 4.0 / (2.0 * 0.25));
+  shape.fastest_frequency = fastest_frequency(shape);
+  EXPECT_NEAR(shape.fastest_frequency, omega, 1e-9);
   EXPECT_NEAR(stable_substep(shape, 1.0), 2.0 / omega, 1e-9);
   EXPECT_NEAR(stable_substep(shape, 0.4), 0.8 / omega, 1e-9);
   EXPECT_NEAR(stiffest_element(shape, shape.positions), omega * omega, 1e-9);
@@ -225,6 +230,144 @@ TEST(StiffestElement, GrowsWithStretching) {
   std::vector<Vector3> x = shape.positions;
   for (Vector3& p : x) p *= 3.0;
   EXPECT_GT(stiffest_element(shape, x), shape.stiffest_element);
+}
+
+const Vector3 block_size(0.02, 0.015, 0.01);
+
+RestShape solid_block(Model model, double damping) {
+  TetrahedralMesh block = make_block(block_size, {4, 3, 2});
+  jitter_inside(block, block_size, 0.005, 0.2);
+  Organ organ = solid_organ(block, block_size, model);
+  organ.material.damping = damping;
+  return build_rest_shape(organ);
+}
+
+template <class Kind>
+void add_dense(const std::vector<Kind>& elements, const RestShape& shape, Eigen::MatrixXd& stiffness) {
+  ElementVectors<Kind> gradient;
+  for (const Kind& element : elements) {
+    element.evaluate(gather(element, shape.positions), gradient);
+    for (std::size_t i = 0; i < Kind::size; ++i) {
+      for (std::size_t j = 0; j < Kind::size; ++j) {
+        stiffness.block<3, 3>(3 * element.vertices[i], 3 * element.vertices[j]) +=
+            element.stiffness * gradient[i] * gradient[j].transpose();
+      }
+    }
+  }
+}
+
+/// The largest frequency, of the whole matrix M^-1/2 K M^-1/2.
+double dense_frequency(const RestShape& shape) {
+  const auto n = static_cast<Eigen::Index>(3 * shape.positions.size());
+  Eigen::MatrixXd stiffness = Eigen::MatrixXd::Zero(n, n);
+  add_dense(shape.distances, shape, stiffness);
+  add_dense(shape.volumes, shape, stiffness);
+  for (const NeoHookeanElement& element : shape.tetrahedra) {
+    const NeoHookeanElement::Vectors x = gather(element, shape.positions);
+    for (std::size_t i = 0; i < 4; ++i) {
+      for (std::size_t j = 0; j < 4; ++j) {
+        stiffness.block<3, 3>(3 * element.vertices[i], 3 * element.vertices[j]) += element.block(x, i, j);
+      }
+    }
+  }
+  Eigen::VectorXd scale(n);
+  for (Eigen::Index i = 0; i < n; ++i) scale[i] = std::sqrt(shape.inverse_mass[static_cast<std::size_t>(i / 3)]);
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * stiffness * scale.asDiagonal();
+  return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(scaled, Eigen::EigenvaluesOnly).eigenvalues()[n - 1]);
+}
+
+TEST(FastestFrequency, OfASolidIsThatOfTheWholeMatrix) {
+  for (const Model model : {Model::fem, Model::volume}) {
+    const RestShape shape = solid_block(model, 0.1);
+    const double exact = dense_frequency(shape);
+    EXPECT_NEAR(shape.fastest_frequency, exact, 0.01 * exact);
+    EXPECT_LE(shape.fastest_frequency, exact * (1.0 + 1e-9)) << "power iteration comes from below";
+  }
+}
+
+TEST(StableSubstep, OfASolidIsASafePartOfTheTextbooks) {
+  // Without damping 2 / omega; stiffness-proportional damping takes a little.
+  const RestShape undamped = solid_block(Model::fem, 0.0);
+  EXPECT_NEAR(undamped.stable_substep, 0.7 * 2.0 / undamped.fastest_frequency, 1e-9 * undamped.stable_substep);
+  const RestShape damped = solid_block(Model::fem, 0.1);
+  EXPECT_DOUBLE_EQ(damped.damping_time, 2.0 * 0.1 / damped.fastest_frequency);
+  const double dt = damped.stable_substep / 0.7;
+  const double omega = damped.fastest_frequency;
+  EXPECT_NEAR(std::pow(0.5 * dt * omega, 2) + 0.5 * dt * damped.damping_time * omega * omega, 1.0, 1e-9);
+}
+
+/// The plainest integrator of tetrahedra, as Motion above: forces of positions + damping_time velocities.
+struct SolidMotion {
+  const RestShape& shape;
+  std::vector<Vector3> x;
+  std::vector<Vector3> v;
+
+  explicit SolidMotion(const RestShape& rest, double speed)
+      : shape(rest), x(rest.positions), v(x.size(), Vector3::Zero()) {
+    Random random(1);
+    for (std::size_t i = 0; i < v.size(); ++i) {
+      if (!shape.attached[i]) v[i] = speed * random_direction(random);
+    }
+  }
+
+  /// Kinetic and elastic energy before the substep.
+  double advance(double dt) {
+    double energy = 0.0;
+    std::vector<Vector3> forces(x.size(), Vector3::Zero());
+    std::vector<Vector3> ahead = x;
+    for (std::size_t i = 0; i < x.size(); ++i) ahead[i] += shape.damping_time * v[i];
+    NeoHookeanElement::Vectors gradient;
+    for (const NeoHookeanElement& element : shape.tetrahedra) {
+      energy += element.evaluate(gather(element, x), gradient);
+      element.evaluate(gather(element, ahead), gradient);
+      for (std::size_t i = 0; i < 4; ++i) forces[element.vertices[i]] -= gradient[i];
+    }
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      energy += 0.5 * shape.mass[i] * v[i].squaredNorm();
+      v[i] += dt * shape.inverse_mass[i] * forces[i];
+      x[i] += dt * v[i];
+    }
+    return energy;
+  }
+
+  double mean_energy(double dt, int substeps) {
+    double sum = 0.0;
+    for (int i = 0; i < substeps; ++i) sum += advance(dt) / substeps;
+    return sum;
+  }
+};
+
+TEST(StableSubstep, OfASolidNeverGainsEnergy) {
+  for (const double damping : {0.0, 0.1, 1.0}) {
+    const RestShape shape = solid_block(Model::fem, damping);
+    SolidMotion motion(shape, 0.05);
+    const double at_start = motion.advance(shape.stable_substep);
+    const double early = motion.mean_energy(shape.stable_substep, 200);
+    EXPECT_LT(early, at_start / (1.0 - 0.7));
+    motion.mean_energy(shape.stable_substep, 1600);
+    const double late = motion.mean_energy(shape.stable_substep, 200);
+    EXPECT_LT(late, (damping > 0.0 ? 0.9 : 1.02) * early) << "damping " << damping;
+    testing::Test::RecordProperty(damping > 0.0 ? "damped_percent" : "undamped_percent",
+                                  static_cast<int>(100.0 * late / early));
+  }
+}
+
+TEST(StableSubstep, OfASolidIsBoundedWhereItBlowsUp) {
+  for (const double damping : {0.0, 0.1, 1.0}) {
+    const RestShape shape = solid_block(Model::fem, damping);
+    for (const double factor : {0.95, 1.05, 1.5}) {
+      const double dt = factor * stable_substep(shape, 1.0);
+      SolidMotion motion(shape, 1e-5);  // so small that the elements are springs
+      const double at_start = motion.advance(dt);
+      double highest = 0.0;
+      for (int i = 0; i < 1000 && highest < 1e9 * at_start; ++i) highest = std::max(highest, motion.advance(dt));
+      if (factor < 1.0) {
+        EXPECT_LT(highest, 30.0 * at_start) << "damping " << damping;
+      } else {
+        EXPECT_GT(highest, 1e6 * at_start) << "damping " << damping << ", " << factor << " of the bound";
+      }
+    }
+  }
 }
 
 }  // namespace

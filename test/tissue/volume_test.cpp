@@ -37,6 +37,10 @@ TEST(Volume, OwesWhatEveryElementOwes) {
   expect_all_that_elements_owe<VolumeElement>(0.0);
 }
 
+TEST(Volume, BlocksAreTheSecondDerivative) {
+  expect_blocks_bound_the_second_derivative<VolumeElement>(0.2, true);
+}
+
 TEST(Volume, AFlatFlapIsFiniteAndResistsBending) {
   const VolumeElement flap = element(0.0, 0.1);
   std::vector<Vector3> x = {{0, -1, 0}, {0, 1, 0}, {1, 0, 0}, {-1, 0, 0}};
