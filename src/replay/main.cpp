@@ -6,11 +6,13 @@
 
 #include "tissue_sim/replay/replay.h"
 #include "tissue_sim/ros/messages.h"
-#include "tissue_sim/scene/scene_file.h"
+#include "tissue_sim/simulation/accuracy.h"
 
 namespace {
 
+using tissue_sim::ModelChoice;
 using tissue_sim::PoseVerdict;
+using tissue_sim::ReplayOrgan;
 using tissue_sim::ReplaySummary;
 
 constexpr const char* usage =
@@ -64,7 +66,16 @@ std::uint64_t count(const ReplaySummary& summary, PoseVerdict verdict) {
   return summary.counters.poses[static_cast<std::size_t>(verdict)];
 }
 
-void print(const ReplaySummary& s) {
+void print(const ReplaySummary& s, const std::vector<ModelChoice>& choices) {
+  for (const ModelChoice& choice : choices) {
+    std::printf("chosen             %s\n", tissue_sim::to_text(choice).c_str());
+    for (const std::string& rejected : choice.rejected) std::printf("  not              %s\n", rejected.c_str());
+  }
+  for (const ReplayOrgan& organ : s.organs) {
+    std::printf("organ %-12s %s, %s: %s; %.3g kg of %.3g kg added by the mass floor\n", organ.name.c_str(),
+                to_string(organ.model), to_string(organ.summary.integrator), organ.summary.integrator_reason.c_str(),
+                organ.summary.added_mass, organ.summary.mass);
+  }
   std::printf("steps              %llu in %.3f simulated seconds\n", static_cast<unsigned long long>(s.steps),
               s.sim_seconds);
   std::printf("poses              %llu used, %llu dropped", static_cast<unsigned long long>(s.poses_used),
@@ -84,7 +95,8 @@ void print(const ReplaySummary& s) {
   std::printf("largest force      %.4f N\n", s.force_max);
   std::printf("non-finite values  %llu\n", static_cast<unsigned long long>(s.non_finite));
   std::printf("recoveries         %llu\n", static_cast<unsigned long long>(s.counters.recoveries));
-  std::printf("ms per step        %.3f median, %.3f at the 99th percentile\n", s.ms_per_step_p50, s.ms_per_step_p99);
+  std::printf("ms per step        %.3f median, %.3f at the 99th percentile, %.3f median in contact\n",
+              s.ms_per_step_p50, s.ms_per_step_p99, s.ms_per_contact_step_p50);
   std::printf("real-time factor   %.2f\n", s.real_time_factor);
   std::printf("hash               %s\n", tissue_sim::hash_text(s.hash).c_str());
 }
@@ -104,7 +116,43 @@ std::string stamp(double value) {
   return text;
 }
 
-void write_json(const ReplaySummary& s, const std::string& path) {
+// In quotes, as JSON has them.
+std::string quoted(const std::string& text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') result += '\\';
+    result += c;
+  }
+  return result + "\"";
+}
+
+void write_organs(const ReplaySummary& s, const std::vector<ModelChoice>& choices, std::ostream& out) {
+  out << "  \"organs\": [";
+  const char* separator = "\n";
+  for (const ReplayOrgan& organ : s.organs) {
+    out << separator << "    {\"organ\": " << quoted(organ.name) << ", \"model\": \"" << to_string(organ.model)
+        << "\", \"integrator\": \"" << to_string(organ.summary.integrator)
+        << "\", \"integrator_reason\": " << quoted(organ.summary.integrator_reason)
+        << ", \"tetrahedra\": " << organ.summary.tetrahedra << ", \"mass_kg\": " << number(organ.summary.mass)
+        << ", \"added_mass_kg\": " << number(organ.summary.added_mass) << "}";
+    separator = ",\n";
+  }
+  out << "\n  ],\n  \"choices\": [";
+  separator = "\n";
+  for (const ModelChoice& choice : choices) {
+    out << separator << "    {\"organ\": " << quoted(choice.organ) << ", \"model\": \"" << to_string(choice.model)
+        << "\", \"solid\": " << quoted(choice.solid) << ", \"integrator\": \"" << to_string(choice.integrator)
+        << "\", \"expected_error\": " << number(choice.expected_error)
+        << ", \"measured_ms\": " << number(1e3 * choice.measured) << ", \"why\": " << quoted(choice.why)
+        << ", \"rejected\": [";
+    for (std::size_t i = 0; i < choice.rejected.size(); ++i) out << (i > 0 ? ", " : "") << quoted(choice.rejected[i]);
+    out << "]}";
+    separator = ",\n";
+  }
+  out << (choices.empty() ? "],\n" : "\n  ],\n");
+}
+
+void write_json(const ReplaySummary& s, const std::vector<ModelChoice>& choices, const std::string& path) {
   std::ofstream out(path);
   out << "{\n"
       << "  \"steps\": " << s.steps << ",\n"
@@ -125,9 +173,11 @@ void write_json(const ReplaySummary& s, const std::string& path) {
       << "  \"recoveries\": " << s.counters.recoveries << ",\n"
       << "  \"ms_per_step_p50\": " << number(s.ms_per_step_p50) << ",\n"
       << "  \"ms_per_step_p99\": " << number(s.ms_per_step_p99) << ",\n"
+      << "  \"ms_per_contact_step_p50\": " << number(s.ms_per_contact_step_p50) << ",\n"
       << "  \"real_time_factor\": " << number(s.real_time_factor) << ",\n"
-      << "  \"hash\": \"" << tissue_sim::hash_text(s.hash) << "\",\n"
-      << "  \"rows\": [";
+      << "  \"hash\": \"" << tissue_sim::hash_text(s.hash) << "\",\n";
+  write_organs(s, choices, out);
+  out << "  \"rows\": [";
   const char* separator = "\n";
   for (const tissue_sim::ReplayRow& row : s.rows) {
     out << separator << "    {\"t\": " << stamp(row.t) << ", \"depth_m\": " << number(row.depth)
@@ -149,12 +199,13 @@ int main(int argc, char** argv) {
   }
   try {
     std::vector<std::string> warnings;
-    const tissue_sim::Scene scene = tissue_sim::load_scene(arguments.scene, warnings);
+    std::vector<ModelChoice> choices;
+    const tissue_sim::Scene scene = tissue_sim::load_chosen_scene(arguments.scene, warnings, choices);
     const ReplaySummary summary = tissue_sim::replay(scene, arguments.options);
     for (const std::string& warning : warnings) std::cerr << "warning: " << warning << "\n";
     for (const std::string& warning : summary.warnings) std::cerr << "warning: " << warning << "\n";
-    print(summary);
-    if (!arguments.json.empty()) write_json(summary, arguments.json);
+    print(summary, choices);
+    if (!arguments.json.empty()) write_json(summary, choices, arguments.json);
   } catch (const std::exception& error) {
     std::cerr << "tissue_sim_replay: " << error.what() << "\n";
     return 1;

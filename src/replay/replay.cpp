@@ -220,7 +220,10 @@ class Replay {
       row.force = std::max(row.force, wrench.force.norm());
       summary_.non_finite += non_finite(wrench.force) + non_finite(wrench.torque);
     }
-    if (row.contacts > 0) ++summary_.contact_steps;
+    if (row.contacts > 0) {
+      ++summary_.contact_steps;
+      contact_step_ms_.push_back(report.profile.total * 1e3);
+    }
     summary_.contacts_max = std::max(summary_.contacts_max, row.contacts);
     summary_.depth_max = std::max(summary_.depth_max, row.depth);
     summary_.force_max = std::max(summary_.force_max, row.force);
@@ -257,6 +260,11 @@ class Replay {
         poses[static_cast<std::size_t>(PoseVerdict::used)] + poses[static_cast<std::size_t>(PoseVerdict::new_run)];
     summary_.ms_per_step_p50 = percentile(step_ms_, 0.50);
     summary_.ms_per_step_p99 = percentile(step_ms_, 0.99);
+    summary_.ms_per_contact_step_p50 = percentile(contact_step_ms_, 0.50);
+    for (std::size_t i = 0; i < scene_.organs.size(); ++i) {
+      const Organ& organ = scene_.organs[i];
+      summary_.organs.push_back({organ.name, organ.model, timeline_.summary(static_cast<int>(i))});
+    }
     summary_.real_time_factor = step_seconds_ > 0.0 ? summary_.sim_seconds / step_seconds_ : 0.0;
     summary_.hash = timeline_.hash();
   }
@@ -269,7 +277,7 @@ class Replay {
   std::vector<std::uint32_t> topology_ids_;
   bool topologies_written_ = false;
   std::int64_t last_stamp_ = 0, simulated_nanoseconds_ = 0;
-  std::vector<double> step_ms_;
+  std::vector<double> step_ms_, contact_step_ms_;
   double step_seconds_ = 0.0;
   ReplaySummary summary_;
 };

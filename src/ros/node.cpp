@@ -4,8 +4,6 @@
 
 #include <algorithm>
 
-#include "tissue_sim/scene/scene_file.h"
-
 namespace tissue_sim {
 namespace {
 
@@ -24,10 +22,15 @@ constexpr unsigned live_queue = 100;
 constexpr unsigned live_state_queue = 10;
 constexpr unsigned no_limit = 0;
 
-Scene load(const std::string& path) {
+Scene load(const std::string& path, std::vector<ModelChoice>& choices) {
   std::vector<std::string> warnings;
-  Scene scene = load_scene(path, warnings);
+  Scene scene = load_chosen_scene(path, warnings, choices);
   for (const std::string& warning : warnings) ROS_WARN_STREAM(warning);
+  for (const ModelChoice& choice : choices) {
+    ROS_INFO_STREAM(to_text(choice));
+    for (const std::string& rejected : choice.rejected)
+      ROS_INFO_STREAM("organ " << choice.organ << ": not " << rejected);
+  }
   return scene;
 }
 
@@ -60,7 +63,7 @@ void add(StepProfile& sum, const StepProfile& step) {
 }  // namespace
 
 Node::Node(const NodeParameters& parameters)
-    : parameters_(parameters), scene_(load(parameters.scene)), timeline_(scene_, parameters.timeline) {
+    : parameters_(parameters), scene_(load(parameters.scene, choices_)), timeline_(scene_, parameters.timeline) {
   node_.setCallbackQueue(&poses_);
   private_.setCallbackQueue(&poses_);
   serving_.setCallbackQueue(&services_);
@@ -267,6 +270,21 @@ void Node::publish_diagnostics() {
   add_value(status, "normalised_quaternions", counters.normalised_quaternions);
   add_value(status, "recoveries", counters.recoveries);
   add_value(status, "resets", counters.resets);
+
+  for (std::size_t i = 0; i < scene_.organs.size(); ++i) {
+    const Organ& organ = scene_.organs[i];
+    const OrganSummary summary = timeline_.summary(static_cast<int>(i));
+    add_value(status, "model_" + organ.name, std::string(to_string(organ.model)));
+    add_value(status, "integrator_" + organ.name, std::string(to_string(summary.integrator)));
+    add_value(status, "integrator_reason_" + organ.name, summary.integrator_reason);
+    add_value(status, "added_mass_kg_" + organ.name, summary.added_mass);
+  }
+  for (const ModelChoice& choice : choices_) {
+    add_value(status, "solid_" + choice.organ, choice.solid);
+    add_value(status, "expected_error_" + choice.organ, choice.expected_error);
+    add_value(status, "measured_ms_" + choice.organ, 1e3 * choice.measured);
+    add_value(status, "chosen_because_" + choice.organ, choice.why);
+  }
 
   status.level = diagnostic_msgs::DiagnosticStatus::OK;
   status.message = report.step > 0 ? "running" : "waiting for poses";

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <iomanip>
 #include <limits>
 #include <sstream>
 
@@ -24,8 +25,8 @@ constexpr double timed_seconds = 0.25;  ///< of wall time, for each candidate
 /// m/s. As a hand moves an instrument; the demonstration's recording has 0.06 at most.
 constexpr double timed_speed = 0.05;
 
-/// Of the depth: how far the instrument goes up and down again once it is in.
-constexpr double timed_stroke = 0.2;
+/// Of the depth: from here on steps count, and this far to either side the instrument slides once it is in.
+constexpr double timed_part = 0.5;
 
 constexpr int least_timed_steps = 5;
 constexpr int most_timed_steps = 4000;
@@ -80,13 +81,16 @@ FreePlace find_free_place(const Organ& organ) {
   return place;
 }
 
-/// An instrument on its way in and out of an organ.
+/// How an instrument presses into an organ.
 struct Press {
   FreePlace place;
+  Vector3 along;  ///< unit, in the surface
   Eigen::Quaterniond orientation;
   double reach = 0.0;  ///< m, how far the instrument stands out before its tip
 
-  Pose at(double above) const { return {place.point + (above + reach) * place.normal, orientation}; }
+  Pose at(double above, double aside) const {
+    return {place.point + (above + reach) * place.normal + aside * along, orientation};
+  }
 };
 
 /// The body along the normal, so that the tip leads into the organ.
@@ -97,6 +101,7 @@ Press plan_press(const Scene& scene, int organ) {
   }
   Press press;
   press.place = find_free_place(scene.organs[organ]);
+  press.along = press.place.normal.unitOrthogonal();
   press.orientation = Eigen::Quaterniond::FromTwoVectors(body, press.place.normal);
   for (const InstrumentPart& part : scene.instruments[0].parts) {
     for (const Vector3& p : part.mesh.vertices) {
@@ -108,9 +113,8 @@ Press plan_press(const Scene& scene, int organ) {
 
 std::string percent(double part) {
   std::ostringstream text;
-  text.precision(2);
   if (std::isfinite(part)) {
-    text << 100.0 * part << " %";
+    text << std::fixed << std::setprecision(part < 0.0995 ? 1 : 0) << 100.0 * part << " %";
   } else {
     text << "unknown";
   }
@@ -305,31 +309,32 @@ PressCost time_press(const Scene& scene, int organ, double seconds, Timeline& ti
   const auto start = std::chrono::steady_clock::now();
   PressCost cost;
   std::vector<double> spent;
+  std::vector<double> all;
   double above = 0.1 * depth;
-  double settled = 0.0;  // s, simulated
-  bool in = false;
+  double slid = 0.0;  // s, since it is in
   for (int i = 0; i < most_timed_steps; ++i) {
     const double so_far = seconds_since(start);
     if (so_far > seconds && static_cast<int>(spent.size()) >= least_timed_steps) break;
-    // Where a step takes long, those on the way in have to do.
-    if (!in && (above <= -depth || so_far > 0.5 * seconds)) in = above <= 0.0;
-    if (above > -depth && settled == 0.0) {
+    if (above > -depth) {
       above -= way_a_step;
     } else {
-      settled += scene.time_step;
-      above = -depth * (1.0 - timed_stroke * 0.5 * (1.0 - std::cos(timed_speed * settled / (timed_stroke * depth))));
+      slid += scene.time_step;
     }
-    timeline.add_pose(0, {first_stamp + i * step, press.at(above)});
+    const double aside = timed_part * depth * std::sin(timed_speed / (timed_part * depth) * slid);
+    // Where a step takes long, those on the way in have to do.
+    const bool counts = above <= -timed_part * depth || so_far > 0.5 * seconds;
+    timeline.add_pose(0, {first_stamp + i * step, press.at(above, aside)});
     for (;;) {
       const auto before = std::chrono::steady_clock::now();
       if (!timeline.step()) break;
-      if (!in || timeline.report().contacts.empty()) continue;
-      spent.push_back(seconds_since(before));
+      all.push_back(seconds_since(before));
+      if (!counts || timeline.report().contacts.empty()) continue;
+      spent.push_back(all.back());
       add(timeline.report().profile, 1.0, cost.profile);
     }
   }
   cost.steps = static_cast<int>(spent.size());
-  cost.step = median(spent);
+  cost.step = median(spent.empty() ? all : spent);
   StepProfile sum;
   std::swap(sum, cost.profile);
   if (cost.steps > 0) add(sum, 1.0 / cost.steps, cost.profile);
@@ -348,7 +353,7 @@ double time_apart(const Scene& scene, double seconds, Timeline& timeline) {
   std::vector<double> spent;
   for (int i = 0; i < most_timed_steps; ++i) {
     if (seconds_since(start) > seconds && i >= least_timed_steps) break;
-    timeline.add_pose(0, {first_stamp + i * step, press.at(far)});
+    timeline.add_pose(0, {first_stamp + i * step, press.at(far, 0.0)});
     const auto before = std::chrono::steady_clock::now();
     while (timeline.step()) spent.push_back(seconds_since(before));
   }

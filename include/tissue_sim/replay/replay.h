@@ -23,6 +23,13 @@ struct ReplayRow {
   std::uint64_t contacts = 0;
 };
 
+/// What an organ was modelled as.
+struct ReplayOrgan {
+  std::string name;
+  Model model = Model::contact_only;
+  OrganSummary summary;
+};
+
 struct ReplaySummary {
   std::uint64_t steps = 0;
   double sim_seconds = 0.0;
@@ -36,6 +43,8 @@ struct ReplaySummary {
   std::uint64_t non_finite = 0;     ///< values in the contacts, forces and states
   double ms_per_step_p50 = 0.0;
   double ms_per_step_p99 = 0.0;
+  double ms_per_contact_step_p50 = 0.0;  ///< over the steps with a contact
+  std::vector<ReplayOrgan> organs;
   double real_time_factor = 0.0;  ///< simulated seconds by the seconds that the steps took
   std::uint64_t hash = 0;         ///< Timeline::hash() at the end
   std::vector<ReplayRow> rows;    ///< one for each stamp on which a pose was reached

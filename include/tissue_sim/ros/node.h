@@ -12,6 +12,7 @@
 
 #include "tissue_sim/ros/frames.h"
 #include "tissue_sim/ros/messages.h"
+#include "tissue_sim/simulation/accuracy.h"
 #include "tissue_sim/simulation/timeline.h"
 
 namespace tissue_sim {
@@ -75,6 +76,7 @@ class Node {
   std::string organ_names() const;
 
   NodeParameters parameters_;
+  std::vector<ModelChoice> choices_;  ///< of the scene's accuracy; filled before the scene
   Scene scene_;
   Timeline timeline_;
 

@@ -34,10 +34,10 @@ double expected_error(const AccuracyTable& table, Model model, Integrator integr
 /// of a piece of the scene's instruments.
 double relative_edges(const Organ& organ, const std::vector<Instrument>& instruments);
 
-/// What a step costs while the first instrument is pressed into an organ and moved there.
+/// What a step costs while the first instrument is pressed into an organ and slides there.
 struct PressCost {
-  double step = 0.0;    ///< s of wall time, the median over the steps in contact after it has settled in
-  int steps = 0;        ///< that this is taken over
+  double step = 0.0;    ///< s of wall time, the median over the steps in contact from half the depth on
+  int steps = 0;        ///< that this is taken over; 0: none was in contact, and it is over all
   StepProfile profile;  ///< the mean over the same steps
 };
 
