@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace tissue_sim {
 
@@ -17,6 +18,7 @@ constexpr double shared_stiffness = 2.0;
 template <class Kind>
 FlatLists corners_of(const std::vector<Kind>& elements, std::size_t vertices) {
   FlatLists lists;
+  if (elements.empty()) return lists;
   lists.first.assign(vertices + 1, 0);
   for (const Kind& element : elements) {
     for (const int vertex : element.vertices) ++lists.first[vertex + 1];
@@ -35,6 +37,7 @@ FlatLists corners_of(const std::vector<Kind>& elements, std::size_t vertices) {
 template <class Kind>
 void add_elements(const std::vector<Kind>& elements, const FlatLists& at, int v, const std::vector<Vector3>& positions,
                   const std::vector<Vector3>& start, double dt, LocalStiffness& local) {
+  if (elements.empty()) return;
   ElementVectors<Kind> gradient;
   for (const int* item = at.begin(v); item != at.end(v); ++item) {
     const std::size_t corner = static_cast<std::size_t>(*item) % Kind::size;
@@ -49,16 +52,40 @@ void add_elements(const std::vector<Kind>& elements, const FlatLists& at, int v,
   }
 }
 
-void add_tetrahedra(const RestShape& rest, const FlatLists& at, int v, const std::vector<Vector3>& damped, double dt,
-                    LocalStiffness& local) {
-  const double implied = 1.0 + rest.damping_time / dt;
-  for (const int* item = at.begin(v); item != at.end(v); ++item) {
-    const std::size_t corner = static_cast<std::size_t>(*item) % 4;
-    const NeoHookeanElement& element = rest.tetrahedra[static_cast<std::size_t>(*item) / 4];
-    const LocalStiffness at_corner = element.local(gather(element, damped), corner);
-    local.gradient += at_corner.gradient;
-    local.block += implied * at_corner.block;
+/// All constraint elements at vertex v.
+void add_elements(const RestShape& rest, const Incidence& at, int v, const std::vector<Vector3>& positions,
+                  const std::vector<Vector3>& start, double dt, LocalStiffness& local) {
+  add_elements(rest.distances, at.distances, v, positions, start, dt, local);
+  add_elements(rest.areas, at.areas, v, positions, start, dt, local);
+  add_elements(rest.volumes, at.volumes, v, positions, start, dt, local);
+}
+
+/// In one write of 16 bytes: the next vertex reads it whole, and would have to wait for three.
+void put(const Vector3& displacement, Eigen::Vector4f& where) {
+  using Four = float __attribute__((vector_size(16)));
+  const Four four = {static_cast<float>(displacement.x()), static_cast<float>(displacement.y()),
+                     static_cast<float>(displacement.z()), 0.0F};
+  std::memcpy(where.data(), &four, sizeof four);
+}
+
+/// Undamped.
+void measure_displacements(const RestShape& rest, const std::vector<Vector3>& positions, DescentRoom& room) {
+  for (std::size_t v = 0; v < room.displacements.size(); ++v) {
+    put(positions[v] - rest.positions[v], room.displacements[v]);
   }
+}
+
+/// The general one takes three times as long.
+Matrix3 inverse_of_symmetric(const Matrix3& a) {
+  const double xx = a(1, 1) * a(2, 2) - a(1, 2) * a(1, 2);
+  const double xy = a(0, 2) * a(1, 2) - a(0, 1) * a(2, 2);
+  const double xz = a(0, 1) * a(1, 2) - a(0, 2) * a(1, 1);
+  const double yy = a(0, 0) * a(2, 2) - a(0, 2) * a(0, 2);
+  const double yz = a(0, 1) * a(0, 2) - a(0, 0) * a(1, 2);
+  const double zz = a(0, 0) * a(1, 1) - a(0, 1) * a(0, 1);
+  Matrix3 inverse;
+  inverse << xx, xy, xz, xy, yy, yz, xz, yz, zz;
+  return inverse / (a(0, 0) * xx + a(0, 1) * xy + a(0, 2) * xz);
 }
 
 /// Gradient of the enclosed volume's constraint by one vertex, 1/m: the triangles around it.
@@ -77,7 +104,14 @@ Vector3 enclosed_gradient(const RestShape& rest, int v, const std::vector<Vector
 class Descent {
  public:
   Descent(const OrganModel& organ, double dt, std::vector<ContactPoint>& points, OrganState& state, DescentRoom& room)
-      : organ_(organ), dt_(dt), points_(points), state_(state), room_(room) {}
+      : organ_(organ),
+        dt_(dt),
+        inertia_((1.0 + dt * organ.drag) / (dt * dt)),
+        damping_(organ.rest.damping_time / dt),
+        corner_sum_(corner_sum()),
+        points_(points),
+        state_(state),
+        room_(room) {}
 
   void start(const Vector3& gravity);
   void sweep();
@@ -86,7 +120,7 @@ class Descent {
  private:
   const RestShape& rest() const { return organ_.rest; }
   bool moves(int v) const { return rest().inverse_mass[v] > 0.0 && !state_.held[v]; }
-  double inertia(int v) const { return (1.0 + dt_ * organ_.drag) / (dt_ * dt_ * rest().inverse_mass[v]); }
+  double inertia(int v) const { return inertia_ * rest().mass[v]; }
   void place(int v, const Vector3& position);
   LocalStiffness look_around(int v) const;
   double push(const ContactPoint& point, double weight, const Vector3& step) const;
@@ -95,6 +129,9 @@ class Descent {
 
   const OrganModel& organ_;
   const double dt_;
+  const double inertia_;  ///< 1/s^2
+  const double damping_;  ///< how much the damping adds to the tetrahedra's blocks
+  const CornerSum corner_sum_;
   std::vector<ContactPoint>& points_;
   OrganState& state_;
   DescentRoom& room_;
@@ -104,7 +141,7 @@ class Descent {
 
 void Descent::start(const Vector3& gravity) {
   room_.start = state_.positions;
-  room_.damped = state_.positions;
+  measure_displacements(rest(), state_.positions, room_);
   if (rest().enclosed.stiffness > 0.0) {
     enclosed_at_start_ = rest().enclosed.evaluate(state_.positions, rest().triangles, room_.inertial);
     enclosed_ = enclosed_at_start_;
@@ -141,16 +178,17 @@ void Descent::place(int v, const Vector3& position) {
     enclosed_ += enclosed_gradient(rest(), v, state_.positions).dot(position - state_.positions[v]);
   }
   state_.positions[v] = position;
-  room_.damped[v] = position + rest().damping_time / dt_ * (position - room_.start[v]);
+  if (room_.displacements.empty()) return;
+  put(position - rest().positions[v] + damping_ * (position - room_.start[v]), room_.displacements[v]);
 }
 
 LocalStiffness Descent::look_around(int v) const {
   LocalStiffness local;
-  const Incidence& at = organ_.incidence;
-  add_elements(rest().distances, at.distances, v, state_.positions, room_.start, dt_, local);
-  add_elements(rest().areas, at.areas, v, state_.positions, room_.start, dt_, local);
-  add_elements(rest().volumes, at.volumes, v, state_.positions, room_.start, dt_, local);
-  add_tetrahedra(rest(), at.tetrahedra, v, room_.damped, dt_, local);
+  if (!room_.displacements.empty()) {
+    local = corner_sum_(organ_.incidence.tetrahedra, v, room_.displacements.data());
+    local.block *= 1.0 + damping_;
+  }
+  add_elements(rest(), organ_.incidence, v, state_.positions, room_.start, dt_, local);
   if (rest().enclosed.stiffness > 0.0) {
     const EnclosedVolume& enclosed = rest().enclosed;
     const Vector3 gradient = enclosed_gradient(rest(), v, state_.positions);
@@ -185,7 +223,7 @@ Vector3 Descent::free_step(int v, LocalStiffness& local, Matrix3& inverse) {
       pressed = true;
     }
     if (!pressed) break;
-    inverse = local.block.inverse();
+    inverse = inverse_of_symmetric(local.block);
     step = -(inverse * local.gradient);
   }
   return step;
@@ -211,7 +249,7 @@ void Descent::sweep() {
     LocalStiffness local = look_around(v);
     local.gradient += inertia(v) * (state_.positions[v] - room_.inertial[v]);
     local.block.diagonal().array() += inertia(v);
-    Matrix3 inverse;
+    Matrix3 inverse = Matrix3::Zero();
     const Vector3 step = free_step(v, local, inverse);
     place(v, state_.positions[v] + stop_step(v, inverse, step));
   }
@@ -232,17 +270,25 @@ double Descent::finish() {
   return std::sqrt(fastest);
 }
 
+/// What vertex v sees of all elements but the enclosed volume, without damping. Wants undamped displacements in the
+/// room.
+LocalStiffness look_around(const RestShape& rest, const Incidence& incidence, int v,
+                           const std::vector<Vector3>& positions, const DescentRoom& room, CornerSum sum) {
+  LocalStiffness local;
+  if (!room.displacements.empty()) local = sum(incidence.tetrahedra, v, room.displacements.data());
+  add_elements(rest, incidence, v, positions, positions, 1.0, local);
+  return local;
+}
+
 /// The stiffness (N/m) that a vertex meets on its own at rest: a third of the trace of its block.
 std::vector<double> vertex_stiffness(const RestShape& rest, const Incidence& incidence) {
-  std::vector<double> stiffness(rest.positions.size(), 0.0);
-  for (std::size_t i = 0; i < stiffness.size(); ++i) {
-    const int v = static_cast<int>(i);
-    LocalStiffness local;
-    add_elements(rest.distances, incidence.distances, v, rest.positions, rest.positions, 1.0, local);
-    add_elements(rest.areas, incidence.areas, v, rest.positions, rest.positions, 1.0, local);
-    add_elements(rest.volumes, incidence.volumes, v, rest.positions, rest.positions, 1.0, local);
-    add_tetrahedra(rest, incidence.tetrahedra, v, rest.positions, 1.0, local);
-    stiffness[i] = local.block.trace() / 3.0;
+  DescentRoom room;
+  prepare(room, rest);
+  std::vector<double> stiffness;
+  for (std::size_t v = 0; v < rest.positions.size(); ++v) {
+    const int vertex = static_cast<int>(v);
+    const LocalStiffness local = look_around(rest, incidence, vertex, rest.positions, room, corner_sum());
+    stiffness.push_back(local.block.trace() / 3.0);
   }
   return stiffness;
 }
@@ -255,7 +301,7 @@ Incidence build_incidence(const RestShape& rest) {
   incidence.distances = corners_of(rest.distances, vertices);
   incidence.areas = corners_of(rest.areas, vertices);
   incidence.volumes = corners_of(rest.volumes, vertices);
-  incidence.tetrahedra = corners_of(rest.tetrahedra, vertices);
+  incidence.tetrahedra = pack_corners(rest.tetrahedra, vertices);
   incidence.stiffness = vertex_stiffness(rest, incidence);
   return incidence;
 }
@@ -263,12 +309,13 @@ Incidence build_incidence(const RestShape& rest) {
 void prepare(DescentRoom& room, const RestShape& rest) {
   room.start = rest.positions;
   room.inertial = rest.positions;
-  room.damped = rest.positions;
+  if (!rest.tetrahedra.empty()) room.displacements.assign(rest.positions.size(), Eigen::Vector4f::Zero());
   room.first_of.assign(rest.positions.size(), -1);
 }
 
 double descend(const OrganModel& organ, const Vector3& gravity, double dt, std::vector<ContactPoint>& points,
                OrganState& state, DescentRoom& room) {
+  const TinyIsZero tiny_is_zero;
   Descent descent(organ, dt, points, state, room);
   descent.start(gravity);
   const int sweeps = std::max(1, static_cast<int>(std::ceil(dt / sweep_period - 1e-9)));
@@ -277,20 +324,24 @@ double descend(const OrganModel& organ, const Vector3& gravity, double dt, std::
 }
 
 void bearing_forces(const OrganModel& organ, const std::vector<ContactPoint>& points, const OrganState& state,
-                    std::vector<Vector3>& forces) {
-  const Incidence& at = organ.incidence;
-  const RestShape& rest = organ.rest;
+                    DescentRoom& room, std::vector<Vector3>& forces) {
+  if (points.empty()) return;
+  const TinyIsZero tiny_is_zero;
+  const CornerSum sum = corner_sum();
+  measure_displacements(organ.rest, state.positions, room);
   for (const ContactPoint& point : points) {
     for (int i = 0; i < point.bearers.count; ++i) {
       const int v = point.bearers.vertices[i];
-      LocalStiffness local;
-      add_elements(rest.distances, at.distances, v, state.positions, state.positions, 1.0, local);
-      add_elements(rest.areas, at.areas, v, state.positions, state.positions, 1.0, local);
-      add_elements(rest.volumes, at.volumes, v, state.positions, state.positions, 1.0, local);
-      add_tetrahedra(rest, at.tetrahedra, v, state.positions, 1.0, local);
-      forces[v] = -local.gradient;
+      forces[v] = -look_around(organ.rest, organ.incidence, v, state.positions, room, sum).gradient;
     }
   }
+}
+
+void bearing_forces(const OrganModel& organ, const std::vector<ContactPoint>& points, const OrganState& state,
+                    std::vector<Vector3>& forces) {
+  DescentRoom room;
+  prepare(room, organ.rest);
+  bearing_forces(organ, points, state, room, forces);
 }
 
 }  // namespace tissue_sim

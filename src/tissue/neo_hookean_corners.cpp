@@ -77,9 +77,9 @@ TISSUE_SIM_INLINE void combine(const Lane& e1, const Three<Lane>& g1, const Lane
 /// Adds what our corner sees of the tetrahedra from lane l on, given u_i - u of the others. With H = F - 1, K its
 /// cofactors, C = 1 + tr H - H^T + K those of F and our own shape gradient g,
 ///   J - 1 = tr H + tr K + det H,  V P g = V (mu H g + t (K g - H^T g) + (s + t tr H) g),
-/// where s = L (J - 1) and t = s - mu: nothing of size one is subtracted, see neo_hookean_batch.cpp. The shape gradients
-/// sum to zero, so with D the determinant of the others' and w = (e2 - e1) x (e3 - e1), K g = -D w and det H = D e1 . w:
-/// K itself is not needed.
+/// where s = L (J - 1) and t = s - mu: nothing of size one is subtracted, see neo_hookean_batch.cpp. The shape
+/// gradients sum to zero, so with D the determinant of the others' and w = (e2 - e1) x (e3 - e1), K g = -D w and det H
+/// = D e1 . w: K itself is not needed.
 template <class Lane>
 TISSUE_SIM_INLINE void add(const CornerBatch& batch, std::size_t l, const Three<Lane>& e1, const Three<Lane>& e2,
                            const Three<Lane>& e3, Sums<Lane>& sums) {
@@ -181,9 +181,13 @@ LocalStiffness corner_sum_baseline(const CornerBatches& corners, int vertex, con
   }
   const Sums<Four>& p = halves[0];
   const Sums<Four>& q = halves[1];
-  const Sums<Four> sums{
-      {p.gradient.x + q.gradient.x, p.gradient.y + q.gradient.y, p.gradient.z + q.gradient.z},
-      p.xx + q.xx, p.xy + q.xy, p.xz + q.xz, p.yy + q.yy, p.yz + q.yz, p.zz + q.zz};
+  const Sums<Four> sums{{p.gradient.x + q.gradient.x, p.gradient.y + q.gradient.y, p.gradient.z + q.gradient.z},
+                        p.xx + q.xx,
+                        p.xy + q.xy,
+                        p.xz + q.xz,
+                        p.yy + q.yy,
+                        p.yz + q.yz,
+                        p.zz + q.zz};
   LocalStiffness local;
   finish(sums, corners.diagonal[v], local);
   return local;
@@ -255,7 +259,8 @@ void put(const NeoHookeanElement& element, std::size_t corner, CornerBatch& batc
     gradients.row(static_cast<Eigen::Index>(i)) = element.shape_gradient(other).transpose();
     batch.others[i][l] = 4 * element.vertices[other];
     for (std::size_t a = 0; a < 3; ++a) {
-      batch.gradients[3 * i + a][l] = static_cast<float>(gradients(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(a)));
+      batch.gradients[3 * i + a][l] =
+          static_cast<float>(gradients(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(a)));
     }
   }
   batch.determinant[l] = static_cast<float>(gradients.determinant());
@@ -302,8 +307,12 @@ CornerSum corner_sum(InstructionSet set) {
 }
 
 #ifdef __x86_64__
-TinyIsZero::TinyIsZero() : before_(_mm_getcsr()) { _mm_setcsr(before_ | 0x8040U); }  // results and operands
-TinyIsZero::~TinyIsZero() { _mm_setcsr(before_); }
+TinyIsZero::TinyIsZero() : before_(_mm_getcsr()) {
+  _mm_setcsr(before_ | 0x8040U);
+}  // results and operands
+TinyIsZero::~TinyIsZero() {
+  _mm_setcsr(before_);
+}
 #else
 TinyIsZero::TinyIsZero() = default;
 TinyIsZero::~TinyIsZero() = default;

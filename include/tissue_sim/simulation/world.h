@@ -5,16 +5,18 @@
 
 #include "tissue_sim/contact/instrument_surface.h"
 #include "tissue_sim/scene/scene.h"
+#include "tissue_sim/tissue/neo_hookean_corners.h"
 #include "tissue_sim/tissue/rest_shape.h"
 
 namespace tissue_sim {
 
-/// The elements at each vertex, by kind: an item is the element's index times the kind's size, plus the vertex's corner.
+/// The elements at each vertex, by kind: an item is the element's index times the kind's size, plus the vertex's
+/// corner. Kinds that the organ has none of have no lists.
 struct Incidence {
   FlatLists distances;
   FlatLists areas;
   FlatLists volumes;
-  FlatLists tetrahedra;
+  CornerBatches tetrahedra;       ///< neo-Hookean
   std::vector<double> stiffness;  ///< N/m, per vertex, its own at rest
 };
 
@@ -24,7 +26,7 @@ struct OrganModel {
   bool restoration = true;
   CollidingSet colliding_set = CollidingSet::flood;
   DepthScheme depth = DepthScheme::exact;
-  double drag = 0.0;                     ///< 1/s
+  double drag = 0.0;                                      ///< 1/s
   Integrator integrator = Integrator::explicit_substeps;  ///< never automatic
   std::string integrator_reason;
   Incidence incidence;                   ///< for vertex block descent, else empty

@@ -19,9 +19,8 @@ struct alignas(32) CornerBatch {
   std::array<float, lanes> volume_stiff;              ///< J, rest volume times lambda + mu
 };
 
-/// The tetrahedra around each vertex, in their given order: batches first[v] to first[v + 1] are vertex v's. What is left
-/// free in its last batch has no volume and adds zeros. 240 bytes a tetrahedron where vertices have a multiple of eight
-/// of them; 56 in a tenth less memory, without the determinant, would lose the digits of a sliver's.
+/// The tetrahedra around each vertex, in their given order: batches first[v] to first[v + 1] are vertex v's. What is
+/// left free in its last batch has no volume and adds zeros. 240 bytes a tetrahedron where nothing is left free.
 struct CornerBatches {
   std::vector<CornerBatch> batches;
   std::vector<int> first;
@@ -35,8 +34,9 @@ CornerBatches pack_corners(const std::vector<NeoHookeanElement>& elements, std::
 /// add_neo_hookean_forces() takes them and for the same reason; the fourth component is not read.
 using CornerSum = LocalStiffness (*)(const CornerBatches& corners, int vertex, const Eigen::Vector4f* displacements);
 
-/// The function for an instruction set, to be asked for once a sweep. All give the same bits: a lane's batches are added
-/// one after the other, then the eight lanes in one order. Throws std::invalid_argument if `set` is not available.
+/// The function for an instruction set, to be asked for once a sweep. All give the same bits: a lane's batches are
+/// added one after the other, then the eight lanes in one order. Throws std::invalid_argument if `set` is not
+/// available.
 CornerSum corner_sum(InstructionSet set = instruction_set());
 
 /// While it lives, numbers below the smallest normal float (1e-38) count as zero. Far from a contact the squares of
