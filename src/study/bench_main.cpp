@@ -1,8 +1,8 @@
-#include <cmath>
-#include <cstdarg>
+#include <algorithm>
 #include <cstdio>
 #include <string>
 
+#include "tissue_sim/study/json_rows.h"
 #include "tissue_sim/study/paper_accuracy.h"
 
 namespace {
@@ -34,21 +34,6 @@ bool read_arguments(int argc, char** argv, Arguments& arguments) {
   }
   return true;
 }
-
-__attribute__((format(printf, 1, 2))) std::string text(const char* format, ...) {
-  char buffer[1024];
-  va_list values;
-  va_start(values, format);
-  std::vsnprintf(buffer, sizeof buffer, format, values);
-  va_end(values);
-  return buffer;
-}
-
-/// Rows as they are made; nothing is written before all of them are there.
-struct JsonRows {
-  std::string rows;
-  void add(const std::string& row) { rows += (rows.empty() ? "\n    {" : ",\n    {") + row + "}"; }
-};
 
 int triangles(int slices) {
   return 2 * slices * (slices - 1);

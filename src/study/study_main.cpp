@@ -1,0 +1,161 @@
+#include <geometry_msgs/PoseStamped.h>
+#include <rosbag/bag.h>
+#include <rosbag/view.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <climits>
+#include <cstdio>
+#include <fstream>
+
+#include "tissue_sim/scene/resource_path.h"
+#include "tissue_sim/study/study_cases.h"
+#include "tissue_sim/study/study_report.h"
+
+namespace {
+
+using namespace tissue_sim;
+
+constexpr const char* usage =
+    "usage: tissue_sim_study --out DIR [--quick] [--case NAME]\n"
+    "  --out DIR    gets study.json, tables.md, accuracy.yaml and plots (SVG)\n"
+    "  --quick      small meshes, under a minute\n"
+    "  --case NAME  only this one: sphere_into_block, probe_into_organ or demo_recording\n";
+
+const std::string case_names[] = {"sphere_into_block", "probe_into_organ", "demo_recording"};
+
+struct Arguments {
+  std::string out;
+  std::string only;
+  bool quick = false;
+};
+
+bool read_arguments(int argc, char** argv, Arguments& arguments) {
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    if (word == "--quick") {
+      arguments.quick = true;
+    } else if (word == "--out" && i + 1 < argc) {
+      arguments.out = argv[++i];
+    } else if (word == "--case" && i + 1 < argc) {
+      arguments.only = argv[++i];
+    } else {
+      return false;
+    }
+  }
+  bool known = arguments.only.empty();
+  for (const std::string& name : case_names) known = known || name == arguments.only;
+  return known && !arguments.out.empty();
+}
+
+std::string this_program() {
+  char path[PATH_MAX + 1] = {};
+  return readlink("/proc/self/exe", path, PATH_MAX) > 0 ? path : "";
+}
+
+std::string machine() {
+  std::ifstream file("/proc/cpuinfo");
+  for (std::string line; std::getline(file, line);) {
+    if (line.rfind("model name", 0) == 0) return line.substr(line.find(": ") + 2);
+  }
+  return "unknown processor";
+}
+
+/// The poses of a recording whose frame is the scene's own.
+std::vector<StampedPose> read_poses(const std::string& path) {
+  std::vector<StampedPose> poses;
+  rosbag::Bag bag(path, rosbag::bagmode::Read);
+  for (const rosbag::MessageInstance& instance : rosbag::View(bag)) {
+    const auto message = instance.instantiate<geometry_msgs::PoseStamped>();
+    if (!message) continue;
+    const auto& [position, orientation] = std::tie(message->pose.position, message->pose.orientation);
+    StampedPose pose;
+    pose.stamp = static_cast<std::int64_t>(message->header.stamp.toNSec());
+    pose.pose.position = {position.x, position.y, position.z};
+    pose.pose.orientation = Eigen::Quaterniond(orientation.w, orientation.x, orientation.y, orientation.z).normalized();
+    if (poses.empty() || pose.stamp > poses.back().stamp) poses.push_back(pose);
+  }
+  return poses;
+}
+
+std::vector<StudyRow> run_cases(const Arguments& arguments, const std::string& config) {
+  std::vector<StudyRow> rows;
+  for (const std::string& name : case_names) {
+    if (!arguments.only.empty() && name != arguments.only) continue;
+    StudyCase given;
+    if (name == case_names[0]) given = sphere_into_block(arguments.quick);
+    if (name == case_names[1]) given = probe_into_organ(arguments.quick, config);
+    if (name == case_names[2]) given = demo_recording(arguments.quick, config, read_poses(config + "/demo.bag"));
+    const std::vector<StudyRow> more = run_study(given, stderr);
+    rows.insert(rows.end(), more.begin(), more.end());
+  }
+  return rows;
+}
+
+void write(const std::string& path, const std::string& content) {
+  std::ofstream file(path, std::ios::binary);
+  file << content;
+  if (!file.flush()) throw std::runtime_error(path + ": cannot be written: check the folder and its rights");
+}
+
+bool run(const std::vector<std::string>& words) {
+  std::vector<char*> pointers;
+  for (const std::string& word : words) pointers.push_back(const_cast<char*>(word.c_str()));
+  pointers.push_back(nullptr);
+  const pid_t child = fork();
+  if (child == 0) {
+    execv(pointers[0], pointers.data());
+    _exit(127);
+  }
+  int status = 0;
+  return child > 0 && waitpid(child, &status, 0) == child && status == 0;
+}
+
+/// By the script that stands beside this program.
+void draw_plots(const std::string& program, const std::string& out) {
+  const std::string script = program.substr(0, program.rfind('/') + 1) + "plot_study.py";
+  const std::string json = out + "/study.json";
+  if (access(script.c_str(), R_OK) == 0 && run({"/usr/bin/python3", script, json, "--out", out})) return;
+  std::fprintf(stderr, "tissue_sim_study: no plots; draw them with: scripts/plot_study.py %s --out %s\n", json.c_str(),
+               out.c_str());
+}
+
+void study(const Arguments& arguments) {
+  if (mkdir(arguments.out.c_str(), 0777) != 0 && access(arguments.out.c_str(), W_OK) != 0) {
+    throw std::runtime_error(arguments.out + ": cannot be made or written: give a folder whose parent exists");
+  }
+  const std::string program = this_program();
+  const std::string scene = resolve_path("package://tissue_sim/config/scenes/demo.yaml", program);
+  const std::string config = scene.substr(0, scene.rfind("/scenes/"));
+  const std::vector<StudyRow> rows = run_cases(arguments, config);
+  const std::string command = std::string("tissue_sim_study --out DIR") + (arguments.quick ? " --quick" : "") +
+                              (arguments.only.empty() ? "" : " --case " + arguments.only);
+  const std::string tables = study_tables(rows, command, machine());
+  write(arguments.out + "/study.json", study_json(rows, command, machine()));
+  write(arguments.out + "/tables.md", tables);
+  write(arguments.out + "/accuracy.yaml", accuracy_table(rows, command, machine()));
+  std::fputs(tables.c_str(), stdout);
+  draw_plots(program, arguments.out);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc == 2 && std::string(argv[1]) == "--help") {
+    std::fputs(usage, stdout);
+    return 0;
+  }
+  Arguments arguments;
+  if (!read_arguments(argc, argv, arguments)) {
+    std::fputs(usage, stderr);
+    return 2;
+  }
+  try {
+    study(arguments);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "tissue_sim_study: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}
