@@ -1,12 +1,12 @@
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
-#include <limits>
 #include <string>
+#include <vector>
 
 #include "tissue_sim/geometry/aabb_tree.h"
-#include "tissue_sim/scene/scene_file.h"
+#include "tissue_sim/simulation/accuracy.h"
+#include "tissue_sim/simulation/integrator.h"
 #include "tissue_sim/simulation/timeline.h"
 
 namespace {
@@ -18,8 +18,8 @@ constexpr const char* usage =
     "  Loads a scene file and says what will be modelled, what is off and what it costs.\n"
     "  Answers 0; 1 with the error on one line if the scene cannot be used; 2 if the arguments are wrong.\n";
 
-constexpr int timed_steps = 100;
-constexpr double timed_press = 0.005;  // m
+constexpr double timed_seconds = 0.25;  // of wall time, for each cost of a step
+constexpr int timed_passes = 15;        // over the elements of one kind
 
 void row(const char* name, const std::string& value) {
   std::printf("  %-22s %s\n", name, value.c_str());
@@ -37,8 +37,84 @@ std::string size_text(const TriangleMesh& mesh) {
   return text("%.4g x %.4g x %.4g m", size.x(), size.y(), size.z());
 }
 
-std::string count_or_off(int count) {
-  return count > 0 ? std::to_string(count) : "off";
+std::string size_of(std::size_t bytes) {
+  return text("%.3g kB", 1e-3 * static_cast<double>(bytes));
+}
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// The median of a few passes, s.
+template <class Pass>
+double time_passes(Pass pass) {
+  std::vector<double> spent;
+  for (int i = 0; i < timed_passes; ++i) {
+    const auto start = std::chrono::steady_clock::now();
+    pass();
+    spent.push_back(seconds_since(start));
+  }
+  std::nth_element(spent.begin(), spent.begin() + timed_passes / 2, spent.end());
+  return spent[timed_passes / 2];
+}
+
+/// The elements of one kind alone, as the explicit integrator has them: s a substep.
+double time_elements(const RestShape& rest) {
+  OrganState state;
+  state.positions = rest.positions;
+  state.velocities.assign(rest.positions.size(), Vector3::Zero());
+  state.forces = state.velocities;
+  ElementRoom room;
+  prepare(room, rest);
+  return time_passes([&] { element_forces(rest, state, state.forces, room); });
+}
+
+/// `off`, or how many there are and what they cost.
+std::string elements_text(std::size_t count, std::size_t bytes, const OrganSummary& summary, const RestShape& alone) {
+  if (count == 0) return "off";
+  const std::string stored = text("on: %zu, ", count) + size_of(bytes);
+  if (summary.integrator != Integrator::explicit_substeps) return stored + ", their time is the integrator's";
+  return stored + text(", %.3g ms a step", 1e3 * summary.substeps * time_elements(alone));
+}
+
+template <class Item>
+std::size_t bytes(const std::vector<Item>& items) {
+  return items.size() * sizeof(Item);
+}
+
+/// What the organ's model stores and steps, each as off, or on with its cost on this machine.
+void print_features(const Organ& organ, const OrganSummary& summary) {
+  const RestShape rest = build_rest_shape(organ);
+  RestShape none = rest;
+  none.distances.clear();
+  none.areas.clear();
+  none.volumes.clear();
+  none.tetrahedra.clear();
+  none.enclosed.stiffness = 0.0;
+  RestShape alone = none;
+  alone.packed = pack(rest.tetrahedra);
+  const std::size_t packed = bytes(alone.packed.batches);
+  row("tetrahedra", organ.model == Model::volume
+                        ? text("on: %d, as distance and volume elements", summary.tetrahedra)
+                        : elements_text(rest.tetrahedra.size(), bytes(rest.tetrahedra) + packed, summary, alone));
+  alone = none;
+  alone.distances = rest.distances;
+  row("distance elements", elements_text(rest.distances.size(), bytes(rest.distances), summary, alone));
+  alone = none;
+  alone.areas = rest.areas;
+  row("area elements", elements_text(rest.areas.size(), bytes(rest.areas), summary, alone));
+  alone = none;
+  alone.volumes = rest.volumes;
+  row("volume elements", elements_text(rest.volumes.size(), bytes(rest.volumes), summary, alone));
+  alone = none;
+  alone.enclosed = rest.enclosed;
+  row("enclosed volume", elements_text(summary.enclosed_volume ? 1 : 0, sizeof rest.enclosed, summary, alone));
+  row("plastic state", summary.plastic ? "on: " + size_of(rest.positions.size()) : "off");
+  std::vector<Vector3> positions = rest.positions;
+  row("embedded surface", !summary.embedded
+                              ? "off"
+                              : text("on: %d vertices carried, %.3g ms a step", rest.first_simulated,
+                                     1e3 * summary.substeps * time_passes([&] { carry_surface(rest, positions); })));
 }
 
 void print_organ(const Organ& organ, const OrganSummary& summary) {
@@ -52,17 +128,20 @@ void print_organ(const Organ& organ, const OrganSummary& summary) {
                    inspect(organ.mesh).components));
   row("size", size_text(organ.mesh));
   row("volume", text("%.4g litres", 1000.0 * enclosed_volume(organ.mesh)));
-  row("attached vertices", summary.attached > 0 ? std::to_string(summary.attached) : "none, the organ can drift");
-  row("distance elements", count_or_off(summary.distance_elements));
-  row("area elements", count_or_off(summary.area_elements));
-  row("volume elements", count_or_off(summary.volume_elements));
+  row("memory", size_of(summary.memory));
+  row("attachments", summary.attached > 0 ? text("on: %d vertices", summary.attached) : "off, the organ can drift");
+  print_features(organ, summary);
+  row("integrator", stepped ? std::string(to_string(summary.integrator)) + ": " + summary.integrator_reason : "off");
   if (!stepped) return;
+  row("simulated vertices", std::to_string(summary.simulated_vertices));
+  row("substeps", text("%d a step, the stable one is %.3g s", summary.substeps, summary.stable_substep));
   row("material", text("young %.4g Pa, poisson %.4g, density %.4g kg/m^3, wall %.4g m", organ.material.young,
                        organ.material.poisson, organ.material.density, organ.wall_thickness));
   row("damping, drag", text("%.4g of critical, %.4g 1/s", organ.material.damping, organ.material.drag));
-  row("mass", text("%.4g kg, of it %.3g kg (%.2f %%) added by the mass floor", summary.mass, summary.added_mass,
-                   summary.mass > 0.0 ? 100.0 * summary.added_mass / summary.mass : 0.0));
-  row("stable substep", text("%.3g s, %d substep(s) a step", summary.stable_substep, summary.substeps));
+  row("mass", text("%.4g kg", summary.mass));
+  row("mass floor", summary.added_mass > 0.0 ? text("on: %.3g kg added, %.2f %%", summary.added_mass,
+                                                    100.0 * summary.added_mass / summary.mass)
+                                             : "off");
 }
 
 void print_instrument(const Instrument& instrument) {
@@ -75,96 +154,57 @@ void print_instrument(const Instrument& instrument) {
   }
 }
 
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-/// Mean wall time of a step, s, while `tip(i)` leads the first instrument; `contacts` counts the steps with any. Where
-/// there are some, the mean is over them: before the touch an organ sleeps and costs nothing.
-template <typename Tip>
-double time_steps(const Scene& scene, Tip tip, int& contacts) {
-  const std::int64_t step = std::llround(scene.time_step * 1e9);
-  Timeline timeline(scene);
-  std::int64_t stamp = 1'000'000'000;
-  timeline.add_pose(0, {stamp, tip(0)});
-  timeline.step_holding(stamp + step);
-  double spent = 0.0;
-  double spent_in_contact = 0.0;
-  int steps = 0;
-  contacts = 0;
-  for (int i = 1; i <= timed_steps; ++i) {
-    stamp = timeline.now() + step;
-    timeline.add_pose(0, {stamp, tip(i)});
-    auto start = std::chrono::steady_clock::now();
-    while (timeline.step_holding(stamp)) {
-      const double seconds = seconds_since(start);
-      ++steps;
-      spent += seconds;
-      if (!timeline.report().contacts.empty()) {
-        ++contacts;
-        spent_in_contact += seconds;
-      }
-      start = std::chrono::steady_clock::now();
-    }
+/// What is made for those who listen only.
+void print_outputs(const Scene& scene) {
+  std::size_t vertices = 0, triangles = 0;
+  for (const Organ& organ : scene.organs) {
+    vertices += organ.mesh.vertices.size();
+    triangles += organ.mesh.triangles.size();
   }
-  if (contacts > 0) return spent_in_contact / contacts;
-  return steps > 0 ? spent / steps : 0.0;
-}
-
-/// The vertex of an organ farthest from what is attached, and the way out of the surface there.
-void free_vertex(const Organ& organ, Vector3& place, Vector3& normal) {
-  Vector3 held = Vector3::Zero();
-  for (const int v : organ.attached) held += organ.mesh.vertices[v] / static_cast<double>(organ.attached.size());
-  int farthest = 0;
-  for (std::size_t v = 0; v < organ.mesh.vertices.size(); ++v) {
-    if ((organ.mesh.vertices[v] - held).norm() > (organ.mesh.vertices[farthest] - held).norm()) {
-      farthest = static_cast<int>(v);
-    }
-  }
-  place = organ.mesh.vertices[farthest];
-  normal = Vector3::Zero();
-  for (const Triangle& t : organ.mesh.triangles) {
-    if (!std::count(t.begin(), t.end(), farthest)) continue;
-    normal += area_normal(organ.mesh.vertices[t[0]], organ.mesh.vertices[t[1]], organ.mesh.vertices[t[2]]);
-  }
-  normal.normalize();
+  std::printf("outputs, each built only while somebody subscribes\n");
+  row("states", size_of(4 * sizeof(float) * vertices) + " for every state period");
+  row("markers", size_of(3 * (3 * sizeof(double) + 4 * sizeof(float)) * triangles) + " for every state period");
+  row("tf transforms", "asked for only when a pose's frame is not " + scene.frame);
 }
 
 void print_cost(const Scene& scene) {
-  // Body along the normal, so that the tip leads into the organ.
-  Vector3 body = Vector3::Zero();
-  for (const InstrumentPart& part : scene.instruments[0].parts) {
-    for (const Vector3& p : part.mesh.vertices) body += p;
-  }
-  Vector3 place, normal;
-  free_vertex(scene.organs[0], place, normal);
-  const Eigen::Quaterniond orientation = Eigen::Quaterniond::FromTwoVectors(body, normal);
-  double reach = 0.0;  // how far the instrument stands out before its tip
-  for (const InstrumentPart& part : scene.instruments[0].parts) {
-    for (const Vector3& p : part.mesh.vertices) reach = std::max(reach, -(orientation * p).dot(normal));
-  }
-  const auto height = [&](double above) { return Pose{place + (above + reach) * normal, orientation}; };
-
-  int apart_contacts = 0, press_contacts = 0;
-  const double far = 10.0 * (bounds_of(scene.organs[0].mesh.vertices).size().norm() + 1.0);
-  const double apart = time_steps(
-      scene, [&](int) { return height(far); }, apart_contacts);
-  const double press = time_steps(
-      scene, [&](int i) { return height(timed_press * (1.0 - 2.0 * i / timed_steps)); }, press_contacts);
-  std::printf("cost on this machine, measured over %d steps of %.4g s\n", timed_steps, scene.time_step);
+  std::printf("cost on this machine, median of the steps of %.4g s in %.2g s\n", scene.time_step, timed_seconds);
   const auto cost = [&](double seconds) {
     return text("%.3f ms a step, %.2f of real time", 1e3 * seconds, seconds / scene.time_step);
   };
-  row("instrument away", cost(apart));
-  row("instrument pressing", cost(press));
-  std::printf("  (%s from %.0f mm above to %.0f mm below the free side of %s; over the %d steps with contact)\n",
-              scene.instruments[0].name.c_str(), 1e3 * timed_press, 1e3 * timed_press, scene.organs[0].name.c_str(),
-              press_contacts);
+  Timeline apart(scene);
+  row("instrument away", cost(time_apart(scene, timed_seconds, apart)));
+  for (std::size_t o = 0; o < scene.organs.size(); ++o) {
+    Timeline timeline(scene);
+    const PressCost press = time_press(scene, static_cast<int>(o), timed_seconds, timeline);
+    const StepProfile& p = press.profile;
+    row("instrument pressing", cost(press.step) + " (" + scene.instruments[0].name + ", up to " +
+                                   text("%.0f mm into the free side of ", 1e3 * timed_press) + scene.organs[o].name +
+                                   text(", %d steps in contact)", press.steps));
+    row("  of it", text("contact %.3f, response and force %.3f, deformation %.3f, health %.3f ms in the mean",
+                        1e3 * (p.refit + p.detection + p.penetration + p.propagation), 1e3 * p.response,
+                        1e3 * p.deformation, 1e3 * p.health));
+  }
+}
+
+void print_choices(const Accuracy& accuracy, const std::vector<ModelChoice>& choices) {
+  if (accuracy.goal == Accuracy::Goal::none) {
+    row("accuracy", "off, every organ names its model");
+  } else if (accuracy.goal == Accuracy::Goal::budget) {
+    row("accuracy", text("at most %.4g ms a step", 1e3 * accuracy.value));
+  } else {
+    row("accuracy", text("an error of at most %.4g %%", 100.0 * accuracy.value));
+  }
+  for (const ModelChoice& choice : choices) {
+    row("chosen", to_text(choice));
+    for (const std::string& rejected : choice.rejected) row("  not", rejected);
+  }
 }
 
 void check(const std::string& path) {
   std::vector<std::string> warnings;
-  const Scene scene = load_scene(path, warnings);
+  std::vector<ModelChoice> choices;
+  const Scene scene = load_chosen_scene(path, warnings, choices);
   for (const std::string& warning : warnings) std::printf("warning: %s\n", warning.c_str());
   const Timeline timeline = [&] {
     try {
@@ -179,10 +219,12 @@ void check(const std::string& path) {
                      ? "off"
                      : text("%.4g %.4g %.4g m/s^2", scene.gravity.x(), scene.gravity.y(), scene.gravity.z()));
   row("time step", text("%.4g s, at most %d substeps", scene.time_step, scene.max_substeps));
+  print_choices(scene.accuracy, choices);
   for (std::size_t o = 0; o < scene.organs.size(); ++o) {
     print_organ(scene.organs[o], timeline.summary(static_cast<int>(o)));
   }
   for (const Instrument& instrument : scene.instruments) print_instrument(instrument);
+  print_outputs(scene);
   print_cost(scene);
 }
 
