@@ -308,19 +308,23 @@ TetrahedralMesh make_block(const std::array<std::vector<double>, 3>& planes) {
   const std::array<int, 3> count = {static_cast<int>(planes[0].size()), static_cast<int>(planes[1].size()),
                                     static_cast<int>(planes[2].size())};
   const std::array<int, 3> step = {1, count[0], count[0] * count[1]};  // from a vertex to the next along each axis
-  // Each tetrahedron is a way along the cell's edges from its lowest corner to its highest: one step along each axis.
+  // Each tetrahedron is a way along the cell's edges from one corner to the opposite: one step along each axis. Cells
+  // in odd places are mirrored, so that the diagonals have no common direction.
   constexpr std::array<std::array<int, 3>, 6> ways = {
       {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}}};
   for (int k = 0; k + 1 < count[2]; ++k) {
     for (int j = 0; j + 1 < count[1]; ++j) {
       for (int i = 0; i + 1 < count[0]; ++i) {
-        const int a = i * step[0] + j * step[1] + k * step[2];
+        const std::array<int, 3> odd = {i % 2, j % 2, k % 2};
+        const int a = (i + odd[0]) * step[0] + (j + odd[1]) * step[1] + (k + odd[2]) * step[2];
+        const auto along = [&](int axis) { return odd[axis] != 0 ? -step[axis] : step[axis]; };
         for (std::size_t way = 0; way < 6; ++way) {
-          const int b = a + step[ways[way][0]];
-          const int c = b + step[ways[way][1]];
-          const int d = c + step[ways[way][2]];
-          // An odd order of the axes turns the tetrahedron inside out.
-          mesh.tetrahedra.push_back(way < 3 ? Tetrahedron{a, b, c, d} : Tetrahedron{a, c, b, d});
+          const int b = a + along(ways[way][0]);
+          const int c = b + along(ways[way][1]);
+          const int d = c + along(ways[way][2]);
+          // An odd order of the axes turns the tetrahedron inside out, and so does each mirror.
+          const bool turned = (way >= 3) != ((odd[0] + odd[1] + odd[2]) % 2 != 0);
+          mesh.tetrahedra.push_back(turned ? Tetrahedron{a, c, b, d} : Tetrahedron{a, b, c, d});
         }
       }
     }

@@ -169,15 +169,17 @@ std::vector<Vector3> enclosed_gradient(const RestShape& shape) {
 
 }  // namespace
 
+void add_stiffness_product(const RestShape& shape, const std::vector<Vector3>& x, std::vector<Vector3>& y) {
+  add_product(shape.distances, &DistanceElement::stiffness, shape, x, y);
+  add_product(shape.areas, &AreaElement::stiffness, shape, x, y);
+  add_product(shape.volumes, &VolumeElement::stiffness, shape, x, y);
+  add_product(shape.tetrahedra, x, y);
+  if (shape.enclosed.stiffness > 0.0) add_enclosed(shape.enclosed.stiffness, enclosed_gradient(shape), x, y);
+}
+
 double fastest_frequency(const RestShape& shape) {
-  const std::vector<Vector3> gradient = enclosed_gradient(shape);
-  return std::sqrt(largest_eigenvalue(shape, [&](const std::vector<Vector3>& x, std::vector<Vector3>& y) {
-    add_product(shape.distances, &DistanceElement::stiffness, shape, x, y);
-    add_product(shape.areas, &AreaElement::stiffness, shape, x, y);
-    add_product(shape.volumes, &VolumeElement::stiffness, shape, x, y);
-    add_product(shape.tetrahedra, x, y);
-    add_enclosed(shape.enclosed.stiffness, gradient, x, y);
-  }));
+  return std::sqrt(largest_eigenvalue(
+      shape, [&](const std::vector<Vector3>& x, std::vector<Vector3>& y) { add_stiffness_product(shape, x, y); }));
 }
 
 double stable_substep(const RestShape& shape, double safety) {

@@ -39,6 +39,7 @@ struct RestShape {
   std::vector<NeoHookeanElement> tetrahedra;  ///< `fem`
   NeoHookeanSolid packed;                     ///< the same tetrahedra for the explicit integrator, else empty
   EnclosedVolume enclosed;
+  double stiffness_correction = 1.0;  ///< of `volume`, from a patch test on the organ's own mesh
   double damping_time = 0.0;       ///< s, of the tetrahedra: their forces are those of positions + damping_time velocities
   double fastest_frequency = 0.0;  ///< rad/s, undamped, at rest
   double stable_substep = 0.0;     ///< s; 0: nothing to integrate

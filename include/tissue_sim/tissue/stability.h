@@ -9,6 +9,9 @@ namespace tissue_sim {
 /// (Gershgorin); the lowest common bound on omega_i that the fraction pays for is found and met.
 void apply_mass_floor(double fraction, RestShape& shape);
 
+/// y += K x, the stiffness (N/m) of all elements at rest times displacements.
+void add_stiffness_product(const RestShape& shape, const std::vector<Vector3>& x, std::vector<Vector3>& y);
+
 /// The largest frequency (rad/s) at which the organ can vibrate, undamped, taken at rest by power iteration.
 double fastest_frequency(const RestShape& shape);
 
