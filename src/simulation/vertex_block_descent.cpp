@@ -75,7 +75,7 @@ void measure_displacements(const RestShape& rest, const std::vector<Vector3>& po
   }
 }
 
-/// The general one takes three times as long.
+/// With a third of the products of the general one, and one division.
 Matrix3 inverse_of_symmetric(const Matrix3& a) {
   const double xx = a(1, 1) * a(2, 2) - a(1, 2) * a(1, 2);
   const double xy = a(0, 2) * a(1, 2) - a(0, 1) * a(2, 2);
@@ -85,7 +85,7 @@ Matrix3 inverse_of_symmetric(const Matrix3& a) {
   const double zz = a(0, 0) * a(1, 1) - a(0, 1) * a(0, 1);
   Matrix3 inverse;
   inverse << xx, xy, xz, xy, yy, yz, xz, yz, zz;
-  return inverse / (a(0, 0) * xx + a(0, 1) * xy + a(0, 2) * xz);
+  return 1.0 / (a(0, 0) * xx + a(0, 1) * xy + a(0, 2) * xz) * inverse;
 }
 
 /// Gradient of the enclosed volume's constraint by one vertex, 1/m: the triangles around it.
@@ -122,6 +122,10 @@ class Descent {
   bool moves(int v) const { return rest().inverse_mass[v] > 0.0 && !state_.held[v]; }
   double inertia(int v) const { return inertia_ * rest().mass[v]; }
   void place(int v, const Vector3& position);
+  LocalStiffness of_tetrahedra(int v) const {
+    if (room_.displacements.empty()) return {};
+    return corner_sum_(organ_.incidence.tetrahedra, v, room_.displacements.data());
+  }
   LocalStiffness look_around(int v) const;
   double push(const ContactPoint& point, double weight, const Vector3& step) const;
   Vector3 free_step(int v, LocalStiffness& local, Matrix3& inverse);
@@ -183,11 +187,8 @@ void Descent::place(int v, const Vector3& position) {
 }
 
 LocalStiffness Descent::look_around(int v) const {
-  LocalStiffness local;
-  if (!room_.displacements.empty()) {
-    local = corner_sum_(organ_.incidence.tetrahedra, v, room_.displacements.data());
-    local.block *= 1.0 + damping_;
-  }
+  LocalStiffness local = of_tetrahedra(v);
+  local.block *= 1.0 + damping_;
   add_elements(rest(), organ_.incidence, v, state_.positions, room_.start, dt_, local);
   if (rest().enclosed.stiffness > 0.0) {
     const EnclosedVolume& enclosed = rest().enclosed;
@@ -329,11 +330,17 @@ void bearing_forces(const OrganModel& organ, const std::vector<ContactPoint>& po
   const TinyIsZero tiny_is_zero;
   const CornerSum sum = corner_sum();
   measure_displacements(organ.rest, state.positions, room);
+  constexpr int done = 0;  // vertices bear many points where an organ is folded over an instrument
   for (const ContactPoint& point : points) {
     for (int i = 0; i < point.bearers.count; ++i) {
       const int v = point.bearers.vertices[i];
+      if (room.first_of[v] == done) continue;
       forces[v] = -look_around(organ.rest, organ.incidence, v, state.positions, room, sum).gradient;
+      room.first_of[v] = done;
     }
+  }
+  for (const ContactPoint& point : points) {
+    for (int i = 0; i < point.bearers.count; ++i) room.first_of[point.bearers.vertices[i]] = -1;
   }
 }
 
