@@ -227,8 +227,12 @@ bool YamlMapping::is_list(const std::string& key) const {
 double YamlMapping::fraction(const std::string& key) const {
   const YAML::Node& node = value(key);
   double fraction = to_number(node);
-  const std::string percent = node.IsScalar() ? node.Scalar() : "";
-  if (!percent.empty() && percent.back() == '%') fraction = 0.01 * to_number(percent.substr(0, percent.size() - 1));
+  std::string text = node.IsScalar() ? node.Scalar() : "";
+  if (!text.empty() && text.back() == '%') {
+    text.pop_back();
+    if (!text.empty() && text.back() == ' ') text.pop_back();
+    fraction = 0.01 * to_number(text);
+  }
   if (fraction > 0.0 && fraction <= 1.0) return fraction;
   fail(key, "is " + shown(node) + ", allowed is a part above 0% and at most 100%, such as 5% or 0.05");
 }

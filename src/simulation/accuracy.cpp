@@ -440,7 +440,13 @@ Scene load_chosen_scene(const std::string& path, std::vector<std::string>& warni
   const bool open = std::any_of(scene.alternatives.begin(), scene.alternatives.end(),
                                 [](const std::vector<Alternative>& each) { return !each.empty(); });
   if (!open) return scene;
-  return choose_models(scene, load_accuracy_table(path), choices);
+  AccuracyTable table;
+  try {
+    table = load_accuracy_table(path);
+  } catch (const SceneError& error) {
+    throw SceneError(scene.accuracy.place + "needs the table of measured errors: " + error.what());
+  }
+  return choose_models(scene, table, choices);
 }
 
 }  // namespace tissue_sim

@@ -38,7 +38,7 @@ std::string size_text(const TriangleMesh& mesh) {
 }
 
 std::string size_of(std::size_t bytes) {
-  return text("%.3g kB", 1e-3 * static_cast<double>(bytes));
+  return text("%.4g kB", 1e-3 * static_cast<double>(bytes));
 }
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
@@ -161,9 +161,11 @@ void print_outputs(const Scene& scene) {
     vertices += organ.mesh.vertices.size();
     triangles += organ.mesh.triangles.size();
   }
-  std::printf("outputs, each built only while somebody subscribes\n");
-  row("states", size_of(4 * sizeof(float) * vertices) + " for every state period");
-  row("markers", size_of(3 * (3 * sizeof(double) + 4 * sizeof(float)) * triangles) + " for every state period");
+  std::printf("outputs\n");
+  row("states", size_of(4 * sizeof(float) * vertices) + " a state period, built only while somebody subscribes");
+  row("markers", size_of(3 * (3 * sizeof(double) + 4 * sizeof(float)) * triangles) +
+                     " a state period, built only while somebody subscribes");
+  row("force", "on: part of the response below");
   row("tf transforms", "asked for only when a pose's frame is not " + scene.frame);
 }
 

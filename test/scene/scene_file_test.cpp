@@ -43,10 +43,38 @@ instruments:
   - {name: probe, urdf: probe.urdf, tip_link: tip, pose_topic: /PSM1/measured_cp}
 )";
 
+/// The octahedron around a vertex at its centre.
+const char* const solid_octahedron =
+    "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n7\n1 0 0 50\n2 50 0 0\n3 0 50 0\n4 -50 0 0\n5 0 -50 0\n"
+    "6 0 0 -50\n7 0 0 0\n$EndNodes\n$Elements\n8\n1 4 2 1 1 7 1 2 3\n2 4 2 1 1 7 1 3 4\n3 4 2 1 1 7 1 4 5\n"
+    "4 4 2 1 1 7 1 5 2\n5 4 2 1 1 7 6 3 2\n6 4 2 1 1 7 6 4 3\n7 4 2 1 1 7 6 5 4\n8 4 2 1 1 7 6 2 5\n"
+    "$EndElements\n";
+
+/// A scene that leaves the model of its organ, of which more keys are given, to the accuracy.
+std::string dial_scene(const std::string& accuracy, const std::string& keys) {
+  return "frame: world\ntime_step: 0.001\naccuracy: " + accuracy +
+         "\norgans:\n  - name: liver\n    scale: 0.001\n    pose: {parent: world, xyz: [1, 0, 0]}\n    " + keys +
+         "\n    attachments:\n      - sphere: {center: [0, 0, -0.05], radius: 0.01}\ninstruments:\n"
+         "  - {name: probe, urdf: probe.urdf, tip_link: tip, pose_topic: a/b}\n";
+}
+const std::string soft = "\n    material: {young: 5400, poisson: 0.45, density: 1060}";
+
+/// `model solid` of each.
+std::vector<std::string> names(const std::vector<Alternative>& alternatives) {
+  std::vector<std::string> found;
+  for (const Alternative& each : alternatives) {
+    found.push_back(to_string(each.organ.model) + (each.solid.empty() ? "" : " " + each.solid));
+  }
+  return found;
+}
+using Names = std::vector<std::string>;
+
 struct SceneFiles : TemporaryFolder {
   SceneFiles() {
     write("organ.obj", octahedron);
     write("probe.urdf", probe);
+    write("solid.msh", solid_octahedron);
+    write("other.msh", solid_octahedron);
   }
   Scene load(const std::string& text) const {
     std::vector<std::string> warnings;
@@ -116,6 +144,95 @@ instruments:
   EXPECT_TRUE(scene.organs[0].attached.empty());
   EXPECT_EQ(scene.organs[1].wall_thickness, 0.0);
   EXPECT_EQ(scene.organs[1].material.density, 0.0);
+}
+
+TEST(SceneFile, AnAccuracyIsABudgetOrAnError) {
+  const SceneFiles files;
+  const Scene budget = files.load(dial_scene("{budget_ms: 0.8}", "mesh: organ.obj"));
+  EXPECT_EQ(budget.accuracy.goal, Accuracy::Goal::budget);
+  EXPECT_DOUBLE_EQ(budget.accuracy.value, 0.0008);
+  EXPECT_NE(budget.accuracy.place.find("scene.yaml:3:12: accuracy.budget_ms: "), std::string::npos)
+      << budget.accuracy.place;
+  for (const char* part : {"5%", "5 %", "'5%'", "0.05", "5e-2"}) {
+    const Scene error = files.load(dial_scene("{error: " + std::string(part) + "}", "mesh: organ.obj"));
+    EXPECT_EQ(error.accuracy.goal, Accuracy::Goal::error);
+    EXPECT_DOUBLE_EQ(error.accuracy.value, 0.05) << part;
+  }
+  EXPECT_EQ(files.load(full_scene).accuracy.goal, Accuracy::Goal::none);
+}
+
+TEST(SceneFile, WhatAnOrganGivesIsWhatItCanBe) {
+  const SceneFiles files;
+  const auto alternatives = [&](const std::string& keys) {
+    return names(files.load(dial_scene("{budget_ms: 1}", keys)).alternatives.at(0));
+  };
+  EXPECT_EQ(alternatives("mesh: organ.obj"), Names({"contact_only"}));
+  EXPECT_EQ(alternatives("mesh: organ.obj\n    wall_thickness: 0.003" + soft), Names({"contact_only", "surface"}));
+  EXPECT_EQ(alternatives("mesh: solid.msh" + soft), Names({"contact_only", "volume solid.msh", "fem solid.msh"}));
+  EXPECT_EQ(alternatives("mesh: organ.obj\n    solid: solid.msh" + soft),
+            Names({"contact_only", "volume solid.msh", "fem solid.msh"}));
+  EXPECT_EQ(
+      alternatives("mesh: organ.obj\n    wall_thickness: 0.003\n    solid: [solid.msh, other.msh]" + soft),
+      Names({"contact_only", "surface", "volume solid.msh", "volume other.msh", "fem solid.msh", "fem other.msh"}));
+}
+
+TEST(SceneFile, AlternativesAreWholeOrgans) {
+  const SceneFiles files;
+  const Scene scene = files.load(
+      dial_scene("{budget_ms: 1}",
+                 "mesh: organ.obj\n    wall_thickness: 0.003\n    restoration: false\n    solid: solid.msh" + soft));
+  ASSERT_EQ(scene.alternatives.size(), 1u);
+  ASSERT_EQ(scene.alternatives[0].size(), 4u);
+  for (const Alternative& each : scene.alternatives[0]) {
+    const Organ& organ = each.organ;
+    const bool solid = is_solid(organ.model);
+    EXPECT_EQ(organ.name, "liver");
+    EXPECT_FALSE(organ.restoration);
+    EXPECT_EQ(organ.material.young, 5400);
+    EXPECT_EQ(organ.wall_thickness, organ.model == Model::surface ? 0.003 : 0.0);
+    EXPECT_EQ(organ.solid.tetrahedra.size(), solid ? 8u : 0u);
+    EXPECT_EQ(organ.embedded, solid);
+    ASSERT_EQ(organ.attached.size(), 1u);
+    const std::vector<Vector3>& bearers = solid ? organ.solid.vertices : organ.mesh.vertices;
+    EXPECT_NEAR((bearers[static_cast<std::size_t>(organ.attached[0])] - Vector3(1, 0, -0.05)).norm(), 0.0, 1e-9);
+  }
+}
+
+TEST(SceneFile, AMeshThatIsASolidIsNotEmbedded) {
+  const SceneFiles files;
+  const Scene scene = files.load(dial_scene("{budget_ms: 1}", "mesh: solid.msh" + soft));
+  ASSERT_EQ(scene.alternatives[0].size(), 3u);
+  EXPECT_TRUE(scene.alternatives[0][0].organ.solid.empty());
+  EXPECT_FALSE(scene.alternatives[0][2].organ.embedded);
+  EXPECT_EQ(scene.alternatives[0][2].organ.solid.vertices.size(), 7u);
+}
+
+TEST(SceneFile, PoissonsRatioDecidesWhatAnOrganCanBe) {
+  const SceneFiles files;
+  const auto load = [&](const std::string& poisson, std::vector<std::string>& warnings) {
+    const std::string keys =
+        "mesh: organ.obj\n    wall_thickness: 0.003\n    solid: solid.msh\n    material: {young: 1, poisson: ";
+    const std::string scene = dial_scene("{error: 5%}", keys + poisson + ", density: 1}");
+    return names(load_scene(files.write("scene.yaml", scene), warnings).alternatives.at(0));
+  };
+  std::vector<std::string> warnings;
+  EXPECT_EQ(load("0.3", warnings), Names({"contact_only", "volume solid.msh", "fem solid.msh"}));
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("accuracy does without surface"), std::string::npos) << warnings[0];
+  EXPECT_EQ(load("0.1", warnings), Names({"contact_only", "fem solid.msh"}));
+  EXPECT_EQ(warnings.size(), 3u);
+}
+
+TEST(SceneFile, AModelThatIsNamedWins) {
+  const SceneFiles files;
+  std::vector<std::string> warnings;
+  const std::string text = dial_scene("{error: 5%}", "model: fem\n    mesh: organ.obj\n    solid: solid.msh" + soft);
+  const Scene scene = load_scene(files.write("scene.yaml", text), warnings);
+  EXPECT_EQ(scene.organs[0].model, Model::fem);
+  ASSERT_EQ(scene.alternatives.size(), 1u);
+  EXPECT_TRUE(scene.alternatives[0].empty());
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("accuracy: chooses nothing"), std::string::npos) << warnings[0];
 }
 
 TEST(SceneFile, WarningsCarryTheirPlace) {
