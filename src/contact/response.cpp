@@ -14,9 +14,10 @@ constexpr int rounds = 8;
 constexpr int rounds_for_forces = 200;
 constexpr double force_tolerance = 1e-6;
 
-/// sum w_i^2 / m_i: how easily the point moves. 0 where all its vertices are attached. Bounded from below so that no
-/// vertex goes more than twice as far as the point is asked to: one free corner with a small weight beside two attached
-/// ones would be thrown.
+/// sum w_i^2 / m_i: how easily the point moves. 0 where all its vertices are attached. Beside attached ones bounded
+/// from below, so that no vertex goes more than twice as far as the point is asked to: one free corner with a small
+/// weight would be thrown. Where all are free there is nothing to bound, and twelve that share a point would be held
+/// back.
 struct Mobility {
   double ease = 0.0;
   bool bounded = false;
@@ -25,12 +26,16 @@ struct Mobility {
 Mobility mobility(const ContactPoint& point, const std::vector<double>& inverse_mass) {
   double sum = 0.0;
   double most = 0.0;
+  bool attached = false;
   for (int i = 0; i < point.bearers.count; ++i) {
-    const double share = point.bearers.weights[i] * inverse_mass[point.bearers.vertices[i]];
+    const double free = inverse_mass[point.bearers.vertices[i]];
+    const double share = point.bearers.weights[i] * free;
     sum += point.bearers.weights[i] * share;
     most = std::max(most, share);
+    attached = attached || free == 0.0;
   }
-  return {std::max(sum, 0.5 * most), sum < 0.5 * most};
+  const bool bounded = attached && sum < 0.5 * most;
+  return {bounded ? 0.5 * most : sum, bounded};
 }
 
 }  // namespace

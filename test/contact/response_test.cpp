@@ -197,5 +197,140 @@ TEST(StopAtInstrument, AttachedVerticesTakeNoVelocity) {
   EXPECT_EQ(still, std::vector<Vector3>(3, Vector3::Zero()));
 }
 
+TEST(StopAtInstrument, AGapMayBeClosedButNotPassed) {
+  // 2 mm above its target with 1 ms to go: 2 m/s are let through, and what is faster is slowed to that.
+  for (const double speed : {1.0, 5.0}) {
+    std::vector<Vector3> v(3, Vector3(0, 0, -speed));
+    std::vector<ContactPoint> points = {point_at({0, 1, 2}, {0.2, 0.3, 0.5}, Vector3::UnitZ(), -0.002)};
+    stop_at_instrument(points, {1.0, 1.0, 1.0}, corners, 0.001, v);
+    EXPECT_NEAR(at_point(points[0], v).z(), -std::min(speed, 2.0), 1e-12);
+    EXPECT_EQ(points[0].impulse > 0.0, speed > 2.0);
+  }
+  // Behind its target it is stopped: push_out has done what was to be done, and throws nothing.
+  std::vector<Vector3> v(3, Vector3(0, 0, -1));
+  std::vector<ContactPoint> points = {point_at({0, 1, 2}, {0.2, 0.3, 0.5}, Vector3::UnitZ(), 0.002)};
+  stop_at_instrument(points, {1.0, 1.0, 1.0}, corners, 0.001, v);
+  EXPECT_NEAR(at_point(points[0], v).z(), 0.0, 1e-12);
+}
+
+/// A point that twelve vertices bear, as one of an embedded surface.
+ContactPoint widely_borne(Random& random, int first) {
+  ContactPoint point;
+  double sum = 0.0;
+  for (int i = 0; i < Bearers::most; ++i) {
+    point.bearers.add(first + i, random_in(random, 0.2, 1.0));
+    sum += point.bearers.weights[i];
+  }
+  for (double& weight : point.bearers.weights) weight /= sum;
+  point.direction = random_direction(random);
+  return point;
+}
+
+TEST(Bearers, AVertexThatBearsAlreadyBearsMore) {
+  Bearers bearers;
+  bearers.add(4, 0.25);
+  bearers.add(7, 0.0);
+  bearers.add(2, 0.5);
+  bearers.add(4, 0.25);
+  ASSERT_EQ(bearers.count, 2);
+  EXPECT_EQ(bearers.vertices[0], 4);
+  EXPECT_EQ(bearers.weights[0], 0.5);
+  EXPECT_EQ(bearers.vertices[1], 2);
+}
+
+TEST(Bearers, TwelveShareTheWayAndTheImpulse) {
+  Random random(4);
+  for (int round = 0; round < 100; ++round) {
+    std::vector<Vector3> x;
+    std::vector<Vector3> v;
+    std::vector<double> inverse_mass;
+    for (int i = 0; i < 20; ++i) {
+      x.push_back(random_point(random));
+      v.push_back(random_point(random));
+      inverse_mass.push_back(random_in(random, 0.5, 2.0));
+    }
+    std::vector<ContactPoint> points = {widely_borne(random, 0), widely_borne(random, 8)};
+    for (ContactPoint& point : points) point.target = point.direction.dot(at_point(point, x)) + 1e-3;
+    std::vector<ContactPoint> first = {points[0]};
+    const std::vector<Vector3> before = x;
+    push_out(first, inverse_mass, x, nullptr);
+    EXPECT_NEAR(behind(first[0], x), 0.0, 1e-15);
+    for (int i = 1; i < Bearers::most; ++i) {
+      const double way = (x[i] - before[i]).norm() / (inverse_mass[i] * first[0].bearers.weights[i]);
+      EXPECT_NEAR(way, (x[0] - before[0]).norm() / (inverse_mass[0] * first[0].bearers.weights[0]), 1e-12 * way);
+    }
+    push_out(points, inverse_mass, x, nullptr);
+    for (const ContactPoint& point : points) EXPECT_LT(behind(point, x), contact_margin);
+
+    const Vector3 momentum_before = momentum(v, inverse_mass);
+    for (ContactPoint& point : points) point.instrument_velocity = at_point(point, v) + point.direction;
+    std::vector<ContactPoint> one = {points[0]};
+    std::vector<Vector3> stopped = v;
+    stop_at_instrument(one, inverse_mass, x, 1.0, stopped);
+    EXPECT_GT(one[0].impulse, 0.0);
+    EXPECT_LT((momentum(stopped, inverse_mass) - momentum_before - one[0].impulse * one[0].direction).norm(), 1e-12);
+    stop_at_instrument(points, inverse_mass, x, 1.0, v);
+    const Vector3 given = points[0].impulse * points[0].direction + points[1].impulse * points[1].direction;
+    EXPECT_LT((momentum(v, inverse_mass) - momentum_before - given).norm(), 1e-12);
+  }
+}
+
+std::vector<ContactPoint> borne(const std::vector<double>& inverse_mass, const std::vector<Vector3>& forces,
+                                std::vector<ContactPoint> points) {
+  std::vector<Vector3> accelerations(forces.size(), Vector3::Zero());
+  bear_forces(inverse_mass, forces, accelerations, points);
+  return points;
+}
+
+TEST(BearForces, OneVertexLeansOnTheInstrumentWithItsForceAlongTheDirection) {
+  const ContactPoint point = point_at({0, 1, 2}, Vector3::UnitY(), Vector3(0, 0.6, -0.8), 0.0);
+  const std::vector<Vector3> forces = {{9, 9, 9}, {1, -2, 3}, {9, 9, 9}};
+  for (const double inverse_mass : {0.1, 10.0}) {
+    EXPECT_NEAR(borne({1.0, inverse_mass, 1.0}, forces, {point})[0].force, 0.6 * 2.0 + 0.8 * 3.0, 1e-12);
+  }
+}
+
+TEST(BearForces, NothingPulls) {
+  const ContactPoint point = point_at({0, 1, 2}, {0.2, 0.3, 0.5}, Vector3::UnitZ(), 0.0);
+  EXPECT_EQ(borne({1.0, 1.0, 1.0}, {{0, 0, 1}, {0, 0, 2}, {0, 0, 1}}, {point})[0].force, 0.0);
+}
+
+TEST(BearForces, WhatIsAttachedIsBorneElsewhere) {
+  const ContactPoint point = point_at({0, 1, 2}, {0.2, 0.3, 0.5}, Vector3::UnitZ(), 0.0);
+  const std::vector<Vector3> forces(3, Vector3(0, 0, -5));
+  EXPECT_EQ(borne({0.0, 0.0, 0.0}, forces, {point})[0].force, 0.0);
+  // The free corner's 5 N at a lever of a half hang on a point that would have to press with 10 N.
+  EXPECT_NEAR(borne({0.0, 0.0, 2.0}, forces, {point})[0].force, 10.0, 1e-9);
+}
+
+TEST(BearForces, PointsThatShareVerticesBearWhatTheyHold) {
+  // Forces that four presses hold exactly are found to be those presses, whatever the masses.
+  Random random(5);
+  const std::vector<std::array<int, 3>> triangles = {{0, 1, 2}, {2, 3, 4}, {0, 2, 4}, {3, 4, 5}};
+  for (int round = 0; round < 100; ++round) {
+    std::vector<double> inverse_mass;
+    for (int i = 0; i < 6; ++i) inverse_mass.push_back(random_in(random, 0.5, 2.0));
+    std::vector<Vector3> forces(6, Vector3::Zero());
+    std::vector<ContactPoint> points;
+    std::vector<double> presses;
+    for (const std::array<int, 3>& vertices : triangles) {
+      const Vector3 direction = (Vector3::UnitZ() + 0.3 * random_direction(random)).normalized();
+      points.push_back(point_at(vertices, Vector3(0.3, 0.4, 0.3), direction, 0.0));
+      presses.push_back(random_in(random, 0.5, 1.0));
+      for (int i = 0; i < 3; ++i) {
+        forces[vertices[i]] -= presses.back() * points.back().bearers.weights[i] * direction;
+      }
+    }
+    Vector3 held = Vector3::Zero();
+    for (const Vector3& force : forces) held += force;
+    points = borne(inverse_mass, forces, points);
+    for (std::size_t p = 0; p < points.size(); ++p) {
+      EXPECT_NEAR(points[p].force, presses[p], 1e-3);
+      held += points[p].force * points[p].direction;
+    }
+    EXPECT_LT(held.norm(), 1e-3);
+  }
+}
+
 }  // namespace
 }  // namespace tissue_sim
