@@ -15,6 +15,13 @@ constexpr double longest_push = 0.5;
 /// Of the same: the motion after which a vertex that was no poke is looked at again.
 constexpr double recheck = 0.05;
 
+/// m; how far inside the instrument an edge is left.
+constexpr double edge_slop = 0.5 * contact_margin;
+
+/// m; a poke stays the one of its corner until another is deeper by this much. Where the organ rests on the instrument
+/// rounding decides which is deepest, and every change is felt (three times as fast a jitter without).
+constexpr double hold = 0.25 * contact_margin;
+
 double longest_side(const OrganSurface& organ, int triangle) {
   const auto& [a, b, c] = organ.triangles[triangle];
   const Vector3& p = organ.positions[a];
@@ -42,6 +49,33 @@ ContactPoint vertex_contact(const OrganSurface& organ, int piece, int vertex, co
   Vector3 weights = Vector3::Zero();
   for (int i = 0; i < 3; ++i) weights[i] = organ.triangles[triangle][i] == vertex ? 1.0 : 0.0;
   return contact_at(organ, piece, triangle, weights, place, direction);
+}
+
+int nearest_corner(const ContactPoint& point) {
+  int corner = 0;
+  point.weights.maxCoeff(&corner);
+  return corner;
+}
+
+/// Among the points from `first` on, which are all pokes: takes the place of the one nearest to the same corner of the
+/// same triangle, if it is deeper.
+void keep_deepest(const OrganSurface& organ, const ContactPoint& poke, bool poked_before, std::size_t first,
+                  Clearance& clearance, std::vector<ContactPoint>& points) {
+  const auto depth = [&](const ContactPoint& point, bool held) {
+    return point.target - point.direction.dot(at_point(point, organ.positions)) + (held ? hold : 0.0);
+  };
+  std::size_t i = first;
+  const int corner = nearest_corner(poke);
+  while (i < points.size() && (points[i].triangle != poke.triangle || nearest_corner(points[i]) != corner)) ++i;
+  if (i == points.size()) {
+    points.push_back(poke);
+  } else {
+    char& other = clearance.pokes[points[i].poking];
+    if (!(depth(poke, poked_before) > depth(points[i], other == 2))) return;
+    other = 0;
+    points[i] = poke;
+  }
+  clearance.pokes[poke.poking] = poked_before ? 2 : 1;
 }
 
 }  // namespace
@@ -108,8 +142,9 @@ void add_edge_contacts(const OrganSurface& organ, const InstrumentSurface& instr
         if (organ.triangles[triangle][corner] == first) weights[corner] = 1.0 - t;
         if (organ.triangles[triangle][corner] == last) weights[corner] = t;
       }
+      const Vector3 left_at = closest.point - edge_slop * closest.direction;
       points.push_back(
-          contact_at(organ, piece, triangle, weights, pose.apply(closest.point), pose.orientation * closest.direction));
+          contact_at(organ, piece, triangle, weights, pose.apply(left_at), pose.orientation * closest.direction));
     };
 
     const Vector3& p = detection.local[first];
@@ -133,7 +168,10 @@ void add_edge_contacts(const OrganSurface& organ, const InstrumentSurface& instr
 
 void add_poke_contacts(const OrganSurface& organ, const InstrumentSurface& instrument, int piece, const Pose& pose,
                        const std::vector<int>& vertices, Clearance& clearance, std::vector<ContactPoint>& points) {
+  const std::size_t first = points.size();
   for (const int u : vertices) {
+    const bool poked_before = clearance.pokes[u] != 0;
+    clearance.pokes[u] = 0;
     const double travelled = clearance.shift + clearance.turn * instrument.vertices[u].norm();
     if (travelled < clearance.free_until[u]) continue;
 
@@ -143,13 +181,13 @@ void add_poke_contacts(const OrganSurface& organ, const InstrumentSurface& instr
     if (closest.triangle < 0) continue;  // a position that is not a number is near nothing
     const double distance = std::sqrt(closest.squared_distance);
     clearance.nearest[u] = closest.triangle;
-    clearance.free_until[u] = travelled + distance - contact_margin;
+    clearance.free_until[u] = travelled + distance - poke_reach;
     const Vector3 outward =
         pseudonormal(organ.positions, organ.triangles, organ.topology, closest.triangle, closest.on.feature);
     const Vector3 above = tip - closest.on.point;
     const bool below_surface = !(above.dot(outward) > 0.0);
     if (!below_surface) clearance.first_touch[u] = travelled + distance;
-    if (!below_surface && !(distance < contact_margin)) continue;
+    if (!below_surface && !(distance < poke_reach)) continue;
 
     const Vector3 direction = distance < 1e-9 ? Vector3(-outward.stableNormalized())
                               : below_surface ? Vector3(above / distance)
@@ -164,8 +202,10 @@ void add_poke_contacts(const OrganSurface& organ, const InstrumentSurface& instr
     if (below_surface) clearance.first_touch[u] = -1e300;
     clearance.free_until[u] = travelled;
     const double way = std::min(below_surface ? distance : -distance, longest_push * side);
-    points.push_back(contact_at(organ, piece, closest.triangle, closest.on.barycentric,
-                                closest.on.point + (way + contact_margin) * direction, direction));
+    ContactPoint poke = contact_at(organ, piece, closest.triangle, closest.on.barycentric,
+                                   closest.on.point + (way + contact_margin) * direction, direction);
+    poke.poking = u;
+    keep_deepest(organ, poke, poked_before, first, clearance, points);
   }
 }
 

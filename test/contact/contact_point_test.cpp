@@ -5,6 +5,7 @@
 
 #include "contact/test_organ.h"
 #include "tissue_sim/contact/response.h"
+#include "tissue_sim/geometry/embedding.h"
 
 namespace tissue_sim {
 namespace {
@@ -104,7 +105,25 @@ TEST(EdgeContacts, AShaftAcrossAnEdgeIsFeltBetweenItsEnds) {
   EXPECT_LT((place_of(points[0], organ) - Vector3(0.005, 0, 0)).norm(), 1e-5);
   EXPECT_LT(points[0].direction.z(), -0.9) << "pushed down, below the shaft";
   const double depth = points[0].target - points[0].direction.dot(place_of(points[0], organ));
-  EXPECT_NEAR(depth, distance_to_mesh(mesh, along_y.apply_inverse(place_of(points[0], organ))), 1e-8);
+  // Half a margin is left.
+  EXPECT_NEAR(depth + 0.5 * contact_margin, distance_to_mesh(mesh, along_y.apply_inverse(place_of(points[0], organ))),
+              1e-8);
+}
+
+TEST(EdgeContacts, AnEdgeIsLeftWhereTheNextPassFindsIt) {
+  TestOrgan organ({{{-0.02, 0, 0}, {0.02, 0, 0}, {0, 0.03, -0.01}, {0, -0.03, -0.01}},
+                   {{0, 1, 2}, {1, 0, 3}, {0, 2, 3}, {1, 3, 2}}});
+  const InstrumentSurface shaft = build_instrument_surface(make_cylinder(0.001, 0.05, 16), true);
+  const Pose along_y = {Vector3(0.005, 0, 0.0006),
+                        Eigen::Quaterniond(Eigen::AngleAxisd(std::acos(0.0), Vector3::UnitX()))};
+  for (int pass = 0; pass < 5; ++pass) {
+    organ.detect_in(shaft, along_y);
+    std::vector<ContactPoint> points;
+    add_edge_contacts(organ.surface(), shaft, 0, along_y, organ.detection, points);
+    ASSERT_EQ(points.size(), 1u) << "pass " << pass;
+    push_out(points, std::vector<double>(4, 1.0), organ.mesh.vertices, nullptr);
+    organ.tree.refit(boxes_of(organ.mesh));
+  }
 }
 
 TEST(EdgeContacts, OfEdgesWithAnEndInsideThereAreNone) {
@@ -114,6 +133,45 @@ TEST(EdgeContacts, OfEdgesWithAnEndInsideThereAreNone) {
   std::vector<ContactPoint> points;
   add_edge_contacts(organ.surface(), box, 0, at(0.031, 0, 0), organ.detection, points);
   EXPECT_TRUE(points.empty());
+}
+
+TEST(BearBy, TheSolidAroundASurfaceBearsItsPoints) {
+  Random random(3);
+  const TriangleMesh surface = make_octasphere(0.01, 2);
+  TetrahedralMesh solid = make_block(Vector3::Constant(0.022), {3, 3, 3});
+  for (Vector3& v : solid.vertices) v.z() += 0.011;
+  const Embedding embedding = embed(surface.vertices, solid);
+  std::vector<ContactPoint> points;
+  for (int t = 0; t < static_cast<int>(surface.triangles.size()); ++t) {
+    ContactPoint point;
+    point.triangle = t;
+    point.weights = t % 3 == 0 ? Vector3(Vector3::UnitY()) : Vector3(random_point(random).cwiseAbs());
+    point.weights /= point.weights.sum();
+    point.bearers.add(99, 1.0);  // of the surface, to be forgotten
+    points.push_back(point);
+  }
+  bear_by(embedding, surface.triangles, points);
+
+  for (Vector3& v : solid.vertices) v += random_point(random, 0.001);
+  int most = 0;
+  for (const ContactPoint& point : points) {
+    Vector3 place = Vector3::Zero();
+    for (int i = 0; i < 3; ++i) {
+      place +=
+          point.weights[i] *
+          embedded_point(embedding, static_cast<std::size_t>(surface.triangles[point.triangle][i]), solid.vertices);
+    }
+    EXPECT_LT((at_point(point, solid.vertices) - place).norm(), 1e-15);
+    double sum = 0.0;
+    for (int i = 0; i < point.bearers.count; ++i) {
+      sum += point.bearers.weights[i];
+      for (int j = 0; j < i; ++j) EXPECT_NE(point.bearers.vertices[i], point.bearers.vertices[j]);
+    }
+    EXPECT_NEAR(sum, 1.0, 1e-12);
+    EXPECT_LE(point.bearers.count, point.triangle % 3 == 0 ? 4 : Bearers::most);
+    most = std::max(most, point.bearers.count);
+  }
+  EXPECT_GT(most, 6);
 }
 
 /// A needle of 0.4 mm that points down, its tip at the frame's origin.
@@ -131,7 +189,7 @@ TriangleMesh slab() {
 TEST(PokeContacts, ATipInTheMiddleOfABigTriangleIsFelt) {
   TestOrgan organ(slab());
   const InstrumentSurface tip = build_instrument_surface(needle(), true);
-  for (const double height : {-0.004, -0.0001, 0.0, 0.5 * contact_margin}) {
+  for (const double height : {-0.004, -0.0001, 0.0, 0.5 * contact_margin, 1.5 * contact_margin}) {
     const Pose pose = at(0.02, 0.01, height);
     EXPECT_TRUE(organ.detect_in(tip, pose).empty());
     EXPECT_TRUE(organ.detection.crossings.empty());
@@ -146,8 +204,43 @@ TEST(PokeContacts, ATipInTheMiddleOfABigTriangleIsFelt) {
     }
     EXPECT_NEAR(lowest, height - contact_margin, 1e-12) << "just below the tip";
   }
-  EXPECT_TRUE(pokes(organ, tip, at(0.02, 0.01, 1.5 * contact_margin)).empty());
+  EXPECT_TRUE(pokes(organ, tip, at(0.02, 0.01, 1.1 * poke_reach)).empty());
   EXPECT_TRUE(pokes(organ, tip, at(0.2, 0.01, -0.004)).empty()) << "beside the organ";
+}
+
+TEST(PokeContacts, WhatRestsOnTheInstrumentIsStillFound) {
+  TestOrgan organ(slab());
+  const InstrumentSurface tip = build_instrument_surface(needle(), true);
+  const Pose pose = at(0.02, 0.01, -0.001);
+  Clearance clearance = new_clearance(tip);
+  for (int pass = 0; pass < 5; ++pass) {
+    const std::vector<ContactPoint> points = pokes(organ, tip, pose, clearance);
+    ASSERT_FALSE(points.empty()) << "pass " << pass;
+    push_out(points, std::vector<double>(organ.mesh.vertices.size(), 1.0), organ.mesh.vertices, nullptr);
+    organ.tree.refit(boxes_of(organ.mesh));
+  }
+}
+
+TEST(PokeContacts, AFineBallOnABigTriangleMakesAPointAtEachOfItsCornersAtMost) {
+  TestOrgan organ(slab());
+  const InstrumentSurface round = build_instrument_surface(make_octasphere(0.01, 5), true);
+  const Pose pose = at(0.001, 0.002, 0.0095);  // on the diagonal of the roof
+  const std::vector<ContactPoint> points = pokes(organ, round, pose);
+  ASSERT_FALSE(points.empty());
+  std::vector<std::pair<int, int>> corners;
+  for (const ContactPoint& point : points) {
+    int corner = 0;
+    point.weights.maxCoeff(&corner);
+    corners.emplace_back(point.triangle, corner);
+    EXPECT_GE(point.poking, 0);
+  }
+  std::sort(corners.begin(), corners.end());
+  EXPECT_TRUE(std::adjacent_find(corners.begin(), corners.end()) == corners.end()) << "two at one corner";
+  double lowest = 0.0;
+  for (const Vector3& v : round.vertices) lowest = std::min(lowest, pose.apply(v).z());
+  double target = 0.0;
+  for (const ContactPoint& point : points) target = std::min(target, -point.target);
+  EXPECT_NEAR(target, lowest - contact_margin, 1e-12) << "the deepest of all is one of them";
 }
 
 TEST(PokeContacts, PushedOutTheTipIsAMarginAboveTheSurface) {

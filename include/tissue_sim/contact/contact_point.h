@@ -22,10 +22,11 @@ struct Bearers {
 
 /// A point of an organ's surface and the plane of the instrument that it must not be behind: direction . x >= target.
 struct ContactPoint {
-  int piece = 0;     ///< of the world's instrument pieces
-  int triangle = 0;  ///< of the organ
+  int piece = 0;                       ///< of the world's instrument pieces
+  int triangle = 0;                    ///< of the organ
   Vector3 weights = Vector3::UnitX();  ///< of the triangle's corners: one is 1 for a colliding vertex
   Bearers bearers;
+  int poking = -1;                                ///< the instrument's vertex, where one pokes into the triangle
   Vector3 direction = Vector3::UnitZ();           ///< scene frame, unit, out of the instrument
   double target = 0.0;                            ///< m
   Vector3 instrument_velocity = Vector3::Zero();  ///< m/s, of the instrument at the point
@@ -37,7 +38,8 @@ struct ContactPoint {
 /// Position, velocity or any other vector at the point, from those of all vertices.
 inline Vector3 at_point(const ContactPoint& point, const std::vector<Vector3>& of_vertices) {
   Vector3 sum = Vector3::Zero();
-  for (int i = 0; i < point.bearers.count; ++i) sum += point.bearers.weights[i] * of_vertices[point.bearers.vertices[i]];
+  for (int i = 0; i < point.bearers.count; ++i)
+    sum += point.bearers.weights[i] * of_vertices[point.bearers.vertices[i]];
   return sum;
 }
 
@@ -47,6 +49,10 @@ void bear_by(const Embedding& embedding, const std::vector<Triangle>& triangles,
 /// m; what touches an instrument within this distance goes on touching, and points of triangles are kept this far out.
 constexpr double contact_margin = 0.02e-3;
 
+/// m; instrument vertices this far above the surface are looked at. Twice what they are kept at: what rests on the
+/// instrument would else be let go in every other pass and fall back, with half the force.
+constexpr double poke_reach = 2.0 * contact_margin;
+
 /// Colliding vertices, by the depths and directions of stages 2 and 3, then those of `touching` that are still within
 /// the margin. Refills `touching` with all of them, ascending.
 void add_vertex_contacts(const OrganSurface& organ, const InstrumentSurface& instrument, int piece, const Pose& pose,
@@ -55,6 +61,7 @@ void add_vertex_contacts(const OrganSurface& organ, const InstrumentSurface& ins
 
 /// Edges that go in and come out again between two vertices outside, at the middle of what is inside; and edges with
 /// one end inside that still run through the instrument once that end is on its surface, as they do along a thin shaft.
+/// They are left half a margin inside, so that the next pass finds them there.
 void add_edge_contacts(const OrganSurface& organ, const InstrumentSurface& instrument, int piece, const Pose& pose,
                        const Detection& detection, std::vector<ContactPoint>& points);
 
@@ -67,16 +74,21 @@ struct Clearance {
   std::vector<double>
       first_touch;           ///< m, per instrument vertex: the travel at which it could first have reached the surface
   std::vector<int> nearest;  ///< per instrument vertex: the organ triangle found last, or -1
+  std::vector<char>
+      pokes;  ///< per instrument vertex: 1 if it made a contact point in the last pass, 2 if not the first
 
   explicit Clearance(std::size_t vertices = 0)
-      : free_until(vertices, 0.0), first_touch(vertices, -1e300), nearest(vertices, -1) {}
+      : free_until(vertices, 0.0), first_touch(vertices, -1e300), nearest(vertices, -1), pokes(vertices, 0) {}
 };
 
-/// Instrument vertices below the organ's surface or within the margin above it: what pokes into a triangle without any
+/// Instrument vertices below the organ's surface or within their reach above it: what pokes into a triangle without any
 /// organ vertex or edge being inside, as a tip thinner than a triangle does. With the two above that is every way two
 /// surfaces can cross: where no organ edge crosses the instrument, what reaches below a flat triangle has its lowest
 /// point at a vertex. Where the surface is folded into itself it has no inside, so what would push against the
 /// instrument's own normal, or is deeper than it can have come since it was outside, is no poke.
+///
+/// A flat triangle is kept out by few of them: for each of its corners the deepest of those that are nearest to it. A
+/// finely meshed ball on 2.5 mm edges gave 120 points, far too many for the rounds of the response, and 20 are left.
 ///
 /// Looks at `vertices` of the instrument only: where it is curved no more sharply than a few organ edges, colliding
 /// vertices are dense enough, and what it reaches between them is a small part of an edge.
