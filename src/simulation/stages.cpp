@@ -54,17 +54,25 @@ Vector3 velocity_of(const Pose& before, const Pose& now, const Vector3& point, d
   return (point - before.apply(now.apply_inverse(point))) / dt;
 }
 
-/// The same place of the organ has the same number in every substep of a step: its vertex, or its triangle behind all
-/// vertices.
+/// The same place of the organ has the same number in every substep of a step: its vertex; the corner of a triangle
+/// that a poke is nearest to; the side of a triangle, by the corner opposite.
 std::size_t place_of(const ContactPoint& point, const RestShape& rest) {
+  const std::size_t first = static_cast<std::size_t>(rest.surface_vertices);
+  const std::size_t of_triangle = 3 * static_cast<std::size_t>(point.triangle);
+  int corner = 0;
+  if (point.poking >= 0) {
+    point.weights.maxCoeff(&corner);
+    return first + of_triangle + static_cast<std::size_t>(corner);
+  }
   for (int i = 0; i < 3; ++i) {
     if (point.weights[i] >= 1.0) return static_cast<std::size_t>(rest.triangles[point.triangle][i]);
   }
-  return static_cast<std::size_t>(rest.surface_vertices + point.triangle);
+  point.weights.minCoeff(&corner);
+  return first + 3 * rest.triangles.size() + of_triangle + static_cast<std::size_t>(corner);
 }
 
 std::size_t count_places(const RestShape& rest) {
-  return static_cast<std::size_t>(rest.surface_vertices) + rest.triangles.size();
+  return static_cast<std::size_t>(rest.surface_vertices) + 6 * rest.triangles.size();
 }
 
 std::size_t place_of_piece(const ContactPoint& point, const RestShape& rest) {
