@@ -336,13 +336,12 @@ class Study {
   }
 
   void find_fine_reference() {
-    const StudyMesh& own = mesh(given_.finest);
-    StudyRun run;
-    run.mesh = given_.finest;
+    const StudyRun& run = given_.reference;
+    const StudyMesh& own = mesh(run.mesh);
     if (given_.hold > 0) {
-      Simulation simulation(given_, run, given_.settling_drag, given_.finest_is_proven);
+      Simulation simulation(given_, run, given_.settling_drag, given_.reference_is_proven);
       settle(simulation);
-      if (given_.finest_is_proven) fine_ = settle_exactly(own, simulation);
+      if (given_.reference_is_proven) fine_ = settle_exactly(own, simulation);
       if (!fine_.proven) {
         if (progress_ != nullptr) {
           std::fprintf(progress_, "%s: the reference on %s is its settled simulation\n", given_.name.c_str(),
@@ -351,7 +350,7 @@ class Study {
         fine_ = as_it_is(own, simulation);
       }
     } else {
-      Simulation simulation(given_, run, given_.material.drag, given_.finest_is_proven);
+      Simulation simulation(given_, run, given_.material.drag, given_.reference_is_proven);
       Reference peak;
       std::vector<double> forces;
       std::int64_t before = 0;
@@ -419,7 +418,7 @@ class Study {
     row.force_error = std::abs(row.force / fine_.force - 1.0);
     compare(own, simulation, displacements_at(fine_, places(row.run.mesh)), row);
     if (!is_solid(row.run.model) || own.embedded || !row.run.restoration || simulation.pokes()) return;
-    const bool of_finest = row.run.mesh == given_.finest && fine_.proven;
+    const bool of_finest = row.run.mesh == given_.reference.mesh && fine_.proven;
     if (own.solid.vertices.size() > most_reference_vertices && !of_finest) return;
     const Reference same = of_finest ? fine_ : settle_exactly(own, simulation);
     if (!same.proven) return;

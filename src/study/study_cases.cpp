@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
+#include <utility>
 
 #include "tissue_sim/contact/instrument_surface.h"
 #include "tissue_sim/geometry/primitives.h"
 #include "tissue_sim/scene/instrument_file.h"
 #include "tissue_sim/scene/mesh_file.h"
 #include "tissue_sim/scene/tetrahedral_mesh_file.h"
+#include "tissue_sim/study/json_rows.h"
 #include "tissue_sim/study/refinement.h"
 
 namespace tissue_sim {
@@ -166,16 +169,43 @@ StudyCase liver_case(const std::string& config, const Liver& liver) {
   return result;
 }
 
-void add_liver_runs(StudyCase& result, const Liver& liver, bool quick, const Vector3& end) {
-  const int coarse = add_mesh(result, own_surface("solid 12 mm", liver.solid_12));
-  result.finest = add_mesh(result, own_surface("solid 8 mm, 2.5 mm at the contact", refined_liver(liver, end, 0.0025)));
-  const int wall = add_mesh(result, surface_only("surface", liver.surface));
-  add_usual_ways(result.runs, coarse, Model::fem);
-  add_usual_ways(result.runs, coarse, Model::volume, !quick);
-  add_usual_ways(result.runs, wall, Model::surface, !quick);
+void add_coarse_liver(StudyCase& result, const Liver& liver, bool quick) {
+  const int wall = add_mesh(result, surface_only("surface 4 mm", liver.surface));
+  const int solid_12 = add_mesh(result, own_surface("solid 12 mm", liver.solid_12));
+  const int in_12 = add_mesh(result, embedded("surface 4 mm in solid 12 mm", liver.surface, liver.solid_12));
   add_usual_ways(result.runs, wall, Model::contact_only);
-  const int carried = add_mesh(result, embedded("surface in solid 12 mm", liver.surface, liver.solid_12));
-  add_usual_ways(result.runs, carried, Model::fem, !quick);
+  add_usual_ways(result.runs, wall, Model::surface, !quick);
+  for (const Model model : {Model::volume, Model::fem}) {
+    if (quick && model == Model::volume) continue;
+    add_usual_ways(result.runs, solid_12, model);
+    add_usual_ways(result.runs, in_12, model, !quick);
+  }
+}
+
+void add_fine_liver(StudyCase& result, const Liver& liver, const Vector3& end) {
+  const int solid_8 = add_mesh(result, own_surface("solid 8 mm", liver.solid_8));
+  const int in_8 = add_mesh(result, embedded("surface 4 mm in solid 8 mm", liver.surface, liver.solid_8));
+  const int refined =
+      add_mesh(result, own_surface("solid 8 mm, 2.5 mm at the contact", refined_liver(liver, end, 0.0025)));
+  for (const Model model : {Model::volume, Model::fem}) {
+    add_usual_ways(result.runs, solid_8, model);
+    add_usual_ways(result.runs, in_8, model);
+    add_usual_ways(result.runs, refined, model);
+  }
+}
+
+/// Larger surfaces cost detection and embedding only.
+void add_large_surfaces(StudyCase& result, const Liver& liver) {
+  const TriangleMesh surface_2 = subdivide(liver.surface);
+  const TriangleMesh surface_1 = subdivide(surface_2);
+  const int wall = add_mesh(result, surface_only("surface 2 mm", surface_2));
+  add_usual_ways(result.runs, wall, Model::surface);
+  for (const TriangleMesh* surface : {&surface_2, &surface_1}) {
+    const std::string size = surface == &surface_2 ? "surface 2 mm" : "surface 1 mm";
+    add_usual_ways(result.runs, add_mesh(result, surface_only(size, *surface)), Model::contact_only);
+    add_usual_ways(result.runs, add_mesh(result, embedded(size + " in solid 8 mm", *surface, liver.solid_8)),
+                   Model::fem);
+  }
 }
 
 }  // namespace
@@ -192,7 +222,16 @@ StudyCase probe_into_organ(bool quick, const std::string& config) {
   result.path.push_back({200 * millisecond, pose});
   result.transient_at = 160 * millisecond;
   result.hold = 500 * millisecond;
-  add_liver_runs(result, liver, quick, liver.first.point);
+  add_coarse_liver(result, liver, quick);
+  const double edge = quick ? 0.004 : 0.0012;
+  result.reference.mesh = add_mesh(result, own_surface(text("solid 8 mm, %g mm at the contact", 1e3 * edge),
+                                                       refined_liver(liver, liver.first.point, edge)));
+  // Explicit integration does not bear what the probe makes of elements as small as these.
+  result.reference.integrator = Integrator::vertex_block_descent;
+  if (quick) return result;
+  add_fine_liver(result, liver, liver.first.point);
+  add_large_surfaces(result, liver);
+  add_usual_ways(result.runs, result.reference.mesh, Model::fem);
   return result;
 }
 
@@ -204,7 +243,18 @@ StudyCase demo_recording(bool quick, const std::string& config, std::vector<Stam
   for (StampedPose& pose : poses) pose.stamp -= start;
   result.path = std::move(poses);
   result.transient_at = 2000 * millisecond;
-  add_liver_runs(result, liver, quick, liver.last.point);
+  add_coarse_liver(result, liver, quick);
+  if (quick) {
+    const auto end = std::find_if(result.path.begin(), result.path.end(),
+                                  [](const StampedPose& pose) { return pose.stamp > 3000 * millisecond; });
+    result.path.erase(end, result.path.end());
+    result.reference.mesh =
+        add_mesh(result, own_surface("solid 8 mm, 4 mm at the contact", refined_liver(liver, liver.last.point, 0.004)));
+  } else {
+    add_fine_liver(result, liver, liver.last.point);
+    result.reference.mesh = static_cast<int>(result.meshes.size()) - 1;
+  }
+  result.reference.finer = 2;
   return result;
 }
 
@@ -224,31 +274,46 @@ StudyCase sphere_into_block(bool quick) {
   pose.position.z() = ball_radius - 0.002;
   result.path.push_back({60 * millisecond, pose});
   result.transient_at = 40 * millisecond;
-  result.hold = 240 * millisecond;
+  result.hold = 500 * millisecond;
   result.settling_drag = 150.0;
-  result.finest_is_proven = true;
+  result.reference_is_proven = true;
 
+  const auto models = {Model::contact_only, Model::surface, Model::volume, Model::fem};
   if (quick) {
-    const int small = add_mesh(result, own_surface("uniform 3.75 mm", uniform_block(4)));
-    result.finest = add_mesh(result, own_surface("graded 1.5 mm", graded_block(0.0015)));
-    for (const Model model : {Model::fem, Model::volume, Model::surface, Model::contact_only}) {
-      add_usual_ways(result.runs, small, model);
-    }
-    add_usual_ways(result.runs, result.finest, Model::fem);
+    const int coarse = add_mesh(result, own_surface("uniform 3.75 mm", uniform_block(4)));
+    result.reference.mesh = add_mesh(result, own_surface("graded 1.25 mm", graded_block(0.00125)));
+    for (const Model model : models) add_usual_ways(result.runs, coarse, model);
+    StudyRun descent = result.reference;
+    descent.integrator = Integrator::vertex_block_descent;
+    result.runs.push_back(descent);
     return result;
   }
-  result.finest = add_mesh(result, own_surface("graded 0.6 mm", graded_block(0.0006)));
+  result.reference.mesh = add_mesh(result, own_surface("graded 0.6 mm", graded_block(0.0006)));
   const int design = add_mesh(result, own_surface("uniform 1.5 mm", uniform_block(10)));
-  for (const Model model : {Model::fem, Model::volume, Model::surface, Model::contact_only}) {
-    add_every_way(result.runs, design, model);
+  for (const Model model : models) add_every_way(result.runs, design, model);
+  for (const auto& [name, solid] :
+       {std::make_pair("uniform 3.75 mm", uniform_block(4)), std::make_pair("uniform 1.9 mm", uniform_block(8)),
+        std::make_pair("graded 1.5 mm", graded_block(0.0015)), std::make_pair("graded 1 mm", graded_block(0.001)),
+        std::make_pair("uniform 0.94 mm", uniform_block(16))}) {
+    const int mesh = add_mesh(result, own_surface(name, solid));
+    for (const Model model : models) add_usual_ways(result.runs, mesh, model);
   }
-  for (const int cells : {4, 8}) {
-    const int mesh =
-        add_mesh(result, own_surface(cells == 4 ? "uniform 3.75 mm" : "uniform 1.9 mm", uniform_block(cells)));
-    for (const Model model : {Model::fem, Model::volume, Model::surface, Model::contact_only}) {
-      add_usual_ways(result.runs, mesh, model);
-    }
+  for (const Model model : {Model::volume, Model::fem}) add_usual_ways(result.runs, result.reference.mesh, model);
+
+  // A fine surface in coarser solids.
+  const TriangleMesh surface_1 = own_surface("", uniform_block(14)).surface;
+  const TriangleMesh surface_half = subdivide(surface_1);
+  const TriangleMesh surface_quarter = subdivide(surface_half);
+  for (const auto& [name, surface, solid] :
+       {std::make_tuple("surface 1.1 mm in 3.75 mm", &surface_1, uniform_block(4)),
+        std::make_tuple("surface 1.1 mm in 1.9 mm", &surface_1, uniform_block(8)),
+        std::make_tuple("surface 0.5 mm in 1.9 mm", &surface_half, uniform_block(8)),
+        std::make_tuple("surface 0.5 mm in 1.5 mm", &surface_half, uniform_block(10)),
+        std::make_tuple("surface 0.27 mm in 1.5 mm", &surface_quarter, uniform_block(10))}) {
+    add_usual_ways(result.runs, add_mesh(result, embedded(name, *surface, solid)), Model::fem);
   }
+  const int large = add_mesh(result, surface_only("surface 0.27 mm", surface_quarter));
+  add_usual_ways(result.runs, large, Model::contact_only);
   return result;
 }
 

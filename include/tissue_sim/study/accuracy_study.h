@@ -46,9 +46,9 @@ struct StudyCase {
   std::int64_t hold = 0;          ///< ns, at the last pose until all is at rest; 0: a recording, errors on its way
   double settling_drag = 0.0;     ///< 1/s, nearly critical: rest comes soonest, and is the same with any drag
   std::vector<StudyMesh> meshes;
-  int finest = 0;  ///< the mesh whose solution is the reference of all
-  /// It is so fine that its vertices alone feel the instrument, and solve_statics() can tell where they rest.
-  bool finest_is_proven = false;
+  StudyRun reference;  ///< on the finest mesh: its solution is what all are measured by
+  /// The mesh is so fine that its vertices alone feel the instrument, and solve_statics() can tell where they rest.
+  bool reference_is_proven = false;
   std::vector<StudyRun> runs;
 };
 
