@@ -7,7 +7,7 @@
 #include "tissue_sim/geometry/aabb_tree.h"
 #include "tissue_sim/simulation/accuracy.h"
 #include "tissue_sim/simulation/integrator.h"
-#include "tissue_sim/simulation/timeline.h"
+#include "tissue_sim/simulation/press_cost.h"
 
 namespace {
 
