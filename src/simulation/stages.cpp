@@ -102,16 +102,33 @@ void record_contact(StepContext& context, const ContactPoint& point) {
   contact.force += context.dt / context.motion.duration * point.force * point.direction;
 }
 
-/// Points start from the force that was found at their places in the substep before.
-void remember_forces(const RestShape& rest, const OrganState& state, OrganWorkspace& work) {
+/// Where the force of a point is remembered. That of a poke goes with the instrument's vertex: the nearest triangle and
+/// corner change with every rounding where it rests between two.
+std::size_t memory_of(const ContactPoint& point, const World& world, const RestShape& rest) {
+  if (point.poking < 0) return place_of_piece(point, rest);
+  std::size_t memory = world.pieces.size() * count_places(rest) + static_cast<std::size_t>(point.poking);
+  for (int piece = 0; piece < point.piece; ++piece) memory += world.pieces[piece].surface.vertices.size();
+  return memory;
+}
+
+std::size_t count_memories(const World& world, const RestShape& rest) {
+  std::size_t memories = world.pieces.size() * count_places(rest);
+  for (const InstrumentPiece& piece : world.pieces) memories += piece.surface.vertices.size();
+  return memories;
+}
+
+/// Points start from the force that was found for them in the substep before.
+void remember_forces(const World& world, const RestShape& rest, const OrganState& state, OrganWorkspace& work) {
   for (const PlaceForce& pressing : state.pressing) work.force_of[pressing.place] = pressing.force;
-  for (ContactPoint& point : work.points) point.force = work.force_of[place_of_piece(point, rest)];
+  for (ContactPoint& point : work.points) point.force = work.force_of[memory_of(point, world, rest)];
   for (const PlaceForce& pressing : state.pressing) work.force_of[pressing.place] = 0.0;
 }
 
-void keep_forces(const RestShape& rest, const OrganWorkspace& work, OrganState& state) {
+void keep_forces(const World& world, const RestShape& rest, const OrganWorkspace& work, OrganState& state) {
   state.pressing.clear();
-  for (const ContactPoint& point : work.points) state.pressing.push_back({place_of_piece(point, rest), point.force});
+  for (const ContactPoint& point : work.points) {
+    state.pressing.push_back({memory_of(point, world, rest), point.force});
+  }
 }
 
 /// Moves the simulated vertices. Returns the largest speed of one, m/s.
@@ -121,10 +138,10 @@ double integrate_elements(StepContext& context) {
   OrganWorkspace& work = context.work();
   if (model.integrator == Integrator::vertex_block_descent) {
     stop_at_instrument(work.points, model.rest.inverse_mass, state.positions, context.dt, state.velocities);
-    remember_forces(model.rest, state, work);
+    remember_forces(context.world, model.rest, state, work);
     const double speed = descend(model, context.world.gravity, context.dt, work.points, state, work.descent);
-    keep_forces(model.rest, work, state);
-    bearing_forces(model, work.points, state, state.forces);
+    keep_forces(context.world, model.rest, work, state);
+    bearing_forces(model, work.points, state, work.descent, state.forces);
     return speed;
   }
   element_forces(model.rest, state, state.forces, work.elements);
@@ -164,7 +181,7 @@ Workspace build_workspace(const World& world) {
     const std::size_t places = world.pieces.size() * count_places(rest);
     if (model.integrator == Integrator::vertex_block_descent) {
       prepare(work.descent, rest);
-      work.force_of.assign(places, 0.0);
+      work.force_of.assign(count_memories(world, rest), 0.0);
     } else {
       prepare(work.elements, rest);
     }

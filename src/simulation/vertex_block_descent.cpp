@@ -329,26 +329,23 @@ void bearing_forces(const OrganModel& organ, const std::vector<ContactPoint>& po
   if (points.empty()) return;
   const TinyIsZero tiny_is_zero;
   const CornerSum sum = corner_sum();
-  measure_displacements(organ.rest, state.positions, room);
+  const RestShape& rest = organ.rest;
+  measure_displacements(rest, state.positions, room);
+  const bool encloses = rest.enclosed.stiffness > 0.0;
+  const double enclosed = encloses ? rest.enclosed.evaluate(state.positions, rest.triangles, room.inertial) : 0.0;
   constexpr int done = 0;  // vertices bear many points where an organ is folded over an instrument
   for (const ContactPoint& point : points) {
     for (int i = 0; i < point.bearers.count; ++i) {
       const int v = point.bearers.vertices[i];
       if (room.first_of[v] == done) continue;
-      forces[v] = -look_around(organ.rest, organ.incidence, v, state.positions, room, sum).gradient;
+      forces[v] = -look_around(rest, organ.incidence, v, state.positions, room, sum).gradient;
+      if (encloses) forces[v] -= rest.enclosed.stiffness * enclosed * enclosed_gradient(rest, v, state.positions);
       room.first_of[v] = done;
     }
   }
   for (const ContactPoint& point : points) {
     for (int i = 0; i < point.bearers.count; ++i) room.first_of[point.bearers.vertices[i]] = -1;
   }
-}
-
-void bearing_forces(const OrganModel& organ, const std::vector<ContactPoint>& points, const OrganState& state,
-                    std::vector<Vector3>& forces) {
-  DescentRoom room;
-  prepare(room, organ.rest);
-  bearing_forces(organ, points, state, room, forces);
 }
 
 }  // namespace tissue_sim
