@@ -16,8 +16,7 @@ constexpr double covered_stiffening = 1.5;
 void tetrahedra_forces(const RestShape& rest, const OrganState& state, ElementRoom& room,
                        std::vector<Vector3>& forces) {
   for (std::size_t v = 0; v < forces.size(); ++v) {
-    const Vector3 displacement =
-        state.positions[v] - rest.positions[v] + rest.damping_time * state.velocities[v];
+    const Vector3 displacement = state.positions[v] - rest.positions[v] + rest.damping_time * state.velocities[v];
     room.displacements[v] << displacement.cast<float>(), 0.0F;
     room.forces[v].setZero();
   }

@@ -34,11 +34,11 @@ std::string make_solid(const fs::path& surface, const TemporaryFolder& folder, c
   return std::system(command.c_str()) == 0 ? out : "";
 }
 
-ReplaySummary replay_with_solid(std::string yaml, const fs::path& scenes, const std::string& solid,
-                                const fs::path& bag, const TemporaryFolder& folder) {
+ReplaySummary replay_with_solid(std::string yaml, const fs::path& scenes, const std::string& solid, const fs::path& bag,
+                                const TemporaryFolder& folder) {
   replace(yaml, "model: surface", "model: fem\n    solid: " + solid);
-  yaml.erase(yaml.find("    wall_thickness"), yaml.find('\n', yaml.find("    wall_thickness")) + 1 -
-                                                  yaml.find("    wall_thickness"));
+  yaml.erase(yaml.find("    wall_thickness"),
+             yaml.find('\n', yaml.find("    wall_thickness")) + 1 - yaml.find("    wall_thickness"));
   replace(yaml, "mesh: ../", "mesh: " + (scenes / "..").string() + "/");
   replace(yaml, "urdf: ../", "urdf: " + (scenes / "..").string() + "/");
   std::vector<std::string> warnings;

@@ -76,8 +76,9 @@ void sort_for_locality(TetrahedralMesh& mesh);
 void sort_vertices_for_locality(TetrahedralMesh& mesh);
 
 /// A block with its top at z = 0 and its bottom at z = -size.z, centred on the z axis. Each of the `cells` (along x, y,
-/// z; 1 or more) is cut into six tetrahedra around a diagonal (Kuhn), its neighbours mirrored, so that they fit together and
-/// no direction is preferred. `size` in metres. Vertex (i, j, k) is number i + (cells[0] + 1) * (j + (cells[1] + 1) * k), k from the bottom up.
+/// z; 1 or more) is cut into six tetrahedra around a diagonal (Kuhn), its neighbours mirrored, so that they fit
+/// together and no direction is preferred. `size` in metres. Vertex (i, j, k) is number i + (cells[0] + 1) * (j +
+/// (cells[1] + 1) * k), k from the bottom up.
 TetrahedralMesh make_block(const Vector3& size, const std::array<int, 3>& cells);
 
 /// The same with the planes between the cells given, in metres: two or more along each axis, strictly ascending.

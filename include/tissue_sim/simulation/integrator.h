@@ -19,8 +19,8 @@ void prepare(ElementRoom& room, const RestShape& rest);
 /// Writes the forces (N) of all elements, damping included, on all vertices.
 void element_forces(const RestShape& rest, const OrganState& state, std::vector<Vector3>& forces, ElementRoom& room);
 
-/// The first half of an explicit (symplectic) substep of dt (s): v += dt (f/m + g), slowed by the drag. Attached and held
-/// vertices stay.
+/// The first half of an explicit (symplectic) substep of dt (s): v += dt (f/m + g), slowed by the drag. Attached and
+/// held vertices stay.
 void accelerate(const OrganModel& organ, const Vector3& gravity, double dt, const std::vector<Vector3>& forces,
                 OrganState& state);
 

@@ -40,7 +40,8 @@ void prepare(DescentRoom& room, const RestShape& rest);
 double descend(const OrganModel& organ, const Vector3& gravity, double dt, std::vector<ContactPoint>& points,
                OrganState& state, DescentRoom& room);
 
-/// Writes the forces (N) of all elements, without damping, on the vertices that bear a contact point. Those of tetrahedra are good to seven digits of the stresses that meet at a vertex.
+/// Writes the forces (N) of all elements, without damping, on the vertices that bear a contact point. Those of
+/// tetrahedra are good to seven digits of the stresses that meet at a vertex.
 void bearing_forces(const OrganModel& organ, const std::vector<ContactPoint>& points, const OrganState& state,
                     DescentRoom& room, std::vector<Vector3>& forces);
 

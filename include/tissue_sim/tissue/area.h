@@ -32,8 +32,8 @@ struct AreaElement : Element<3> {
     const Vector3 side = x[(corner + 2) % 3] - x[(corner + 1) % 3];
     const Vector3 gradient = n.cross(side) / (2.0 * scale);
     const double stretch = std::max(0.0, 0.5 * twice_area - rest) / (scale * scale);
-    return stiffness * (gradient * gradient.transpose() +
-                        stretch * side.squaredNorm() / (2.0 * twice_area) * n * n.transpose());
+    return stiffness *
+           (gradient * gradient.transpose() + stretch * side.squaredNorm() / (2.0 * twice_area) * n * n.transpose());
   }
 };
 

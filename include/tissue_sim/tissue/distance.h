@@ -17,8 +17,8 @@ struct DistanceElement : Element<2> {
     return (length - rest) / scale;
   }
 
-  /// Second derivative of the energy by one end's position, N/m: k / scale^2 (n n^T + (1 - rest/length) (1 - n n^T)), the
-  /// second part left out where the edge is shortened, so that it is positive semi-definite.
+  /// Second derivative of the energy by one end's position, N/m: k / scale^2 (n n^T + (1 - rest/length) (1 - n n^T)),
+  /// the second part left out where the edge is shortened, so that it is positive semi-definite.
   Matrix3 block(const ElementVectors<DistanceElement>& x, std::size_t) const {
     const Vector3 along = x[1] - x[0];
     const double length = along.norm();

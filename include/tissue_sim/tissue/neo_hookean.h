@@ -30,9 +30,9 @@ struct LocalStiffness {
 /// Flesh Simulation", 2018, without the logarithm of their last form): with the deformation gradient F, its determinant
 /// J and L = lambda + mu,
 ///   E = V (mu/2 (|F|^2 - 3) - mu (J - 1) + L/2 (J - 1)^2).
-/// It is zero and at its minimum at rest, has the moduli mu and lambda at small strain, and stays finite and smooth when
-/// a tetrahedron is flattened or turned inside out. J is linear in each corner, so the second derivative by one corner
-/// is positive definite everywhere, exactly and without any projection.
+/// It is zero and at its minimum at rest, has the moduli mu and lambda at small strain, and stays finite and smooth
+/// when a tetrahedron is flattened or turned inside out. J is linear in each corner, so the second derivative by one
+/// corner is positive definite everywhere, exactly and without any projection.
 struct NeoHookeanElement {
   static constexpr std::size_t size = 4;
   using Vectors = std::array<Vector3, size>;

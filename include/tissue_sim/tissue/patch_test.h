@@ -15,8 +15,8 @@ struct PatchTest {
 /// One end of the organ along `axis` (its outermost tenth) is held, the other is moved along the axis `along`.
 PatchTest pull_ends(const RestShape& shape, int axis, int along);
 
-/// The energy (J) that the organ's elements hold in the test, in linear elasticity at rest, by conjugate gradients on what
-/// is free.
+/// The energy (J) that the organ's elements hold in the test, in linear elasticity at rest, by conjugate gradients on
+/// what is free.
 double patch_energy(const RestShape& shape, const PatchTest& test);
 
 }  // namespace tissue_sim

@@ -15,8 +15,8 @@ namespace tissue_sim {
 /// What is known of an organ before anything moves: topology, rest measures, masses, elements. Built once, never
 /// changed.
 struct RestShape {
-  /// m, scene frame. First the surface's vertices, which contact works on. Behind them the inner vertices of a solid; or,
-  /// where the surface is embedded, all vertices of the solid that carries it.
+  /// m, scene frame. First the surface's vertices, which contact works on. Behind them the inner vertices of a solid;
+  /// or, where the surface is embedded, all vertices of the solid that carries it.
   std::vector<Vector3> positions;
   int surface_vertices = 0;
   int first_simulated = 0;  ///< the vertices before it are carried: without mass, moved by `embedding`
@@ -40,10 +40,10 @@ struct RestShape {
   NeoHookeanSolid packed;                     ///< the same tetrahedra for the explicit integrator, else empty
   EnclosedVolume enclosed;
   double stiffness_correction = 1.0;  ///< of `volume`, from a patch test on the organ's own mesh
-  double damping_time = 0.0;       ///< s, of the tetrahedra: their forces are those of positions + damping_time velocities
+  double damping_time = 0.0;  ///< s, of the tetrahedra: their forces are those of positions + damping_time velocities
   double fastest_frequency = 0.0;  ///< rad/s, undamped, at rest
   double stable_substep = 0.0;     ///< s; 0: nothing to integrate
-  double stiffest_element = 0.0;  ///< 1/s^2, see stiffest_element()
+  double stiffest_element = 0.0;   ///< 1/s^2, see stiffest_element()
 
   bool elastic() const { return !distances.empty() || !tetrahedra.empty(); }
 };
