@@ -69,7 +69,7 @@ void accelerate(const OrganModel& organ, const Vector3& gravity, double dt, cons
   const RestShape& rest = organ.rest;
   for (std::size_t v = static_cast<std::size_t>(rest.first_simulated); v < forces.size(); ++v) {
     if (rest.attached[v]) continue;
-    if (state.held[v]) {
+    if (state.holds(v)) {
       state.velocities[v].setZero();
       continue;
     }
@@ -82,7 +82,7 @@ double advance(const OrganModel& organ, double dt, OrganState& state) {
   const RestShape& rest = organ.rest;
   double fastest = 0.0;
   for (std::size_t v = static_cast<std::size_t>(rest.first_simulated); v < state.positions.size(); ++v) {
-    if (rest.attached[v] || state.held[v]) continue;
+    if (rest.attached[v] || state.holds(v)) continue;
     state.positions[v] += dt * state.velocities[v];
     fastest = std::max(fastest, state.velocities[v].squaredNorm());
   }

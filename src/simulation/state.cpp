@@ -30,7 +30,7 @@ OrganState rest_state(const World& world, int organ) {
   state.velocities.assign(vertices, Vector3::Zero());
   state.forces.assign(vertices, Vector3::Zero());
   state.depths.assign(static_cast<std::size_t>(model.rest.surface_vertices), 0.0);
-  state.held.assign(vertices, 0);
+  if (!model.restoration) state.held.assign(vertices, 0);
   state.colliding.resize(world.pieces.size());
   if (model.colliding_set == CollidingSet::paper) {
     for (std::vector<char>& memory : state.colliding) memory.assign(vertices, 0);

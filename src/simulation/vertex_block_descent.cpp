@@ -119,7 +119,7 @@ class Descent {
 
  private:
   const RestShape& rest() const { return organ_.rest; }
-  bool moves(int v) const { return rest().inverse_mass[v] > 0.0 && !state_.held[v]; }
+  bool moves(int v) const { return rest().inverse_mass[v] > 0.0 && !state_.holds(static_cast<std::size_t>(v)); }
   double inertia(int v) const { return inertia_ * rest().mass[v]; }
   void place(int v, const Vector3& position);
   LocalStiffness of_tetrahedra(int v) const {

@@ -21,7 +21,7 @@ struct OrganState {
   std::vector<Vector3> velocities;           ///< m/s
   std::vector<Vector3> forces;               ///< N, of the elements in the last substep
   std::vector<double> depths;                ///< m, one a surface vertex, 0 where no instrument presses
-  std::vector<char> held;                    ///< 1: moved by an instrument and left there (restoration off)
+  std::vector<char> held;                    ///< 1: moved by an instrument and left there; empty with restoration
   std::vector<std::vector<char>> colliding;  ///< per piece, one a vertex: the paper's memory; empty for the flood
   std::vector<std::vector<int>> touching;    ///< per piece: vertices that were in contact in the last substep
   std::vector<Clearance> clearances;         ///< per piece
