@@ -27,6 +27,8 @@ struct OrganState {
   std::vector<Clearance> clearances;         ///< per piece
   std::vector<PlaceForce> pressing;          ///< vertex block descent starts from them
   bool asleep = true;                        ///< at rest and untouched: nothing to integrate
+
+  bool holds(std::size_t vertex) const { return !held.empty() && held[vertex] != 0; }
 };
 
 /// Small, flat, copied to restore or compare.
