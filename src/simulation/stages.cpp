@@ -186,6 +186,7 @@ Workspace build_workspace(const World& world) {
       prepare(work.elements, rest);
     }
     work.contact_of.assign(places, 0);
+    work.points.reserve(usual_contacts);
     work.contacts.reserve(usual_contacts);
     work.contact_step.assign(places, 0);
     work.last_good = rest_state(world, static_cast<int>(organ));
