@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <new>
 
-#include "simulation/test_scenes.h"
+#include "simulation/solid_scenes.h"
 
 namespace {
 std::size_t allocations = 0;
@@ -68,6 +68,55 @@ std::size_t allocations_once_warm(DepthScheme depth, CollidingSet set) {
   const std::size_t after = allocations;
   EXPECT_GT(contacts, 50);
   return after - before;
+}
+
+/// A ball on top of a solid, down and up again, of which the first two times warm it.
+std::size_t allocations_of_a_solid(Organ organ, double top, double radius) {
+  organ.material.drag = 60.0;
+  Simulation simulation(scene_of(organ, {round_ball(radius, 16)}));
+  Pose above = ball_over_block(radius, -0.001);
+  above.position.z() += top;
+  simulation.start_at(above);
+  Motion motion = {0.001, {{true, above, above}}};
+  int contacts = 0;
+  const auto down_and_up = [&]() {
+    for (int i = 1; i <= 100; ++i) {
+      motion.instruments[0].from = motion.instruments[0].to;
+      motion.instruments[0].to.position.z() = above.position.z() - 0.003 * std::min(i, 100 - i) / 50.0;
+      ++simulation.report.step;
+      step(simulation.world, motion, simulation.state, simulation.workspace, simulation.report);
+      contacts += static_cast<int>(simulation.report.contacts.size());
+    }
+    for (int i = 0; i < 100; ++i) {
+      motion.instruments[0].from = motion.instruments[0].to;
+      step(simulation.world, motion, simulation.state, simulation.workspace, simulation.report);
+    }
+  };
+  down_and_up();
+  down_and_up();
+  contacts = 0;
+  const std::size_t before = allocations;
+  down_and_up();
+  const std::size_t after = allocations;
+  EXPECT_GT(contacts, 50);
+  return after - before;
+}
+
+TEST(Allocation, NoneInAWarmStepOfASolid) {
+  for (const Model model : {Model::fem, Model::volume}) {
+    for (const Integrator integrator : {Integrator::explicit_substeps, Integrator::vertex_block_descent}) {
+      EXPECT_EQ(allocations_of_a_solid(soft_block(model, 3, integrator), 0.0, 0.006), 0u);
+      EXPECT_EQ(allocations_of_a_solid(soft_block(model, 3, integrator), 0.0, 0.001), 0u) << "thinner than a triangle";
+    }
+  }
+}
+
+TEST(Allocation, NoneInAWarmStepOfAnEmbeddedSurface) {
+  for (const Integrator integrator : {Integrator::explicit_substeps, Integrator::vertex_block_descent}) {
+    Organ organ = embedded_sphere(0.015, 32, 3, Model::fem);
+    organ.integrator = integrator;
+    EXPECT_EQ(allocations_of_a_solid(organ, organ.mesh.vertices.front().z(), 0.006), 0u);
+  }
 }
 
 TEST(Allocation, NoneInAWarmStep) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 #include <set>
 
@@ -188,6 +189,58 @@ TEST(Step, TheAttachmentBearsWhatTheProbePresses) {
   }
   const Vector3& pressed = simulation.report.wrenches[0].force;
   EXPECT_LT((borne + pressed).norm(), 0.01 * pressed.norm());
+}
+
+TEST(Step, AnInstrumentWithoutAPoseIsNotThere) {
+  // A second ball lies across the organ's wall where poses begin; it has none yet.
+  for (const CollidingSet set : {CollidingSet::flood, CollidingSet::paper}) {
+    Organ organ = wall_sphere(16);
+    organ.colliding_set = set;
+    Instrument across = ball(0.03, "across");
+    for (Vector3& v : across.parts[0].mesh.vertices) v.x() += 0.05;
+    Simulation simulation(scene_of(organ, {ball(ball_radius), across}));
+    simulation.start_at(ball_at(-0.05));
+    for (int i = 0; i < 3; ++i) simulation.go_to(ball_at(-0.05));
+    EXPECT_TRUE(simulation.report.contacts.empty());
+    EXPECT_TRUE(simulation.organ().asleep);
+    EXPECT_EQ(simulation.organ().positions, simulation.rest().positions);
+    for (const std::vector<char>& memory : simulation.organ().colliding) {
+      EXPECT_EQ(std::count(memory.begin(), memory.end(), 1), 0);
+    }
+
+    Motion placed = {0.001, {{true, ball_at(-0.05), ball_at(-0.05)}, {true, Pose(), Pose()}}};
+    step(simulation.world, placed, simulation.state, simulation.workspace, simulation.report);
+    EXPECT_FALSE(simulation.report.contacts.empty()) << "given a pose, it is";
+  }
+}
+
+TEST(Step, ARecoveryOfOneOrganLeavesTheOthersWrench) {
+  // Two balls of one instrument press an organ each.
+  Scene scene = scene_of(wall_sphere(16), {ball(ball_radius)});
+  scene.organs.push_back(wall_sphere(16));
+  for (Vector3& v : scene.organs[1].mesh.vertices) v.y() += 0.15;
+  InstrumentPart second = scene.instruments[0].parts[0];
+  for (Vector3& v : second.mesh.vertices) v.y() += 0.15;
+  scene.instruments[0].parts.push_back(second);
+  Simulation simulation(scene);
+  simulation.start_at(ball_at(-0.002));
+  simulation.slide_to(ball_at(0.006), 60);
+  for (int i = 0; i < 300; ++i) simulation.go_to(simulation.poses[0]);
+  const double both = simulation.report.wrenches[0].force.x();
+
+  simulation.state.organs[1].positions[100].y() = std::numeric_limits<double>::quiet_NaN();
+  simulation.go_to(simulation.poses[0]);
+  EXPECT_TRUE(simulation.report.recovered);
+  Vector3 of_first = Vector3::Zero();
+  for (const OrganContact& contact : simulation.report.contacts) {
+    EXPECT_EQ(contact.organ, 0);
+    of_first -= contact.force;
+  }
+  const Vector3& force = simulation.report.wrenches[0].force;
+  EXPECT_LT((force - of_first).norm(), 1e-15);
+  EXPECT_TRUE(simulation.report.wrenches[0].torque.allFinite());
+  EXPECT_NEAR(force.x(), 0.5 * both, 0.1 * both);
+  EXPECT_GT(force.x(), 0.0);
 }
 
 }  // namespace
