@@ -159,6 +159,13 @@ void Node::give_pose(std::size_t instrument, const FramedPose& pose) {
   held_since_ = ros::Time::now();
 }
 
+/// Contacts and wrenches carry forces, markers show them.
+bool Node::forces_wanted() const {
+  return contacts_.getNumSubscribers() > 0 || markers_.getNumSubscribers() > 0 ||
+         std::any_of(inputs_.begin(), inputs_.end(),
+                     [](const Input& input) { return input.wrench.getNumSubscribers() > 0; });
+}
+
 void Node::step_while_poses_allow() {
   while (ros::ok() && timeline_.step()) {
     after_step(false);
@@ -183,6 +190,7 @@ void Node::hold_in_realtime() {
 
 void Node::after_step(bool holding) {
   const StepReport& report = timeline_.report();
+  timeline_.set_forces_wanted(forces_wanted());  // in the next step: a subscriber may have come or gone
   add(profile_, report.profile);
   ++period_steps_;
   // Zero before the first step, and a new run goes back: neither is time that was simulated.

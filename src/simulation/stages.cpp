@@ -141,7 +141,7 @@ double integrate_elements(StepContext& context) {
     remember_forces(context.world, model.rest, state, work);
     const double speed = descend(model, context.world.gravity, context.dt, work.points, state, work.descent);
     keep_forces(context.world, model.rest, work, state);
-    bearing_forces(model, work.points, state, work.descent, state.forces);
+    if (context.motion.forces_wanted) bearing_forces(model, work.points, state, work.descent, state.forces);
     return speed;
   }
   element_forces(model.rest, state, state.forces, work.elements);
@@ -374,7 +374,11 @@ void bear(StepContext& context) {
   if (work.points.empty()) return;
   const Lap lap(context.report.profile.response);
   const RestShape& rest = context.model().rest;
-  if (rest.elastic()) bear_forces(rest.inverse_mass, context.state.forces, work.accelerations, work.points);
+  if (!context.motion.forces_wanted) {
+    for (ContactPoint& point : work.points) point.force = 0.0;
+  } else if (rest.elastic()) {
+    bear_forces(rest.inverse_mass, context.state.forces, work.accelerations, work.points);
+  }
   for (const ContactPoint& point : work.points) record_contact(context, point);
 }
 

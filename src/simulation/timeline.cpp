@@ -259,6 +259,10 @@ bool Timeline::step_holding(std::int64_t until) {
   return true;
 }
 
+void Timeline::set_forces_wanted(bool wanted) {
+  impl_->motion.forces_wanted = wanted;
+}
+
 void Timeline::reset(int organ) {
   for (std::size_t i = 0; i < impl_->state.organs.size(); ++i) {
     if (organ < 0 || organ == static_cast<int>(i)) impl_->reset_organ(static_cast<int>(i));

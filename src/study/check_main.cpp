@@ -165,7 +165,7 @@ void print_outputs(const Scene& scene) {
   row("states", size_of(4 * sizeof(float) * vertices) + " a state period, built only while somebody subscribes");
   row("markers", size_of(3 * (3 * sizeof(double) + 4 * sizeof(float)) * triangles) +
                      " a state period, built only while somebody subscribes");
-  row("force", "on: part of the response below");
+  row("force", "part of the response below, computed only while somebody subscribes");
   row("tf transforms", "asked for only when a pose's frame is not " + scene.frame);
 }
 

@@ -406,6 +406,29 @@ std::uint64_t feed_hostile_poses(const Scene& scene, int poses) {
   return timeline.counters().recoveries;
 }
 
+TEST(Timeline, WithoutForcesAllElseIsTheSame) {
+  for (const Integrator integrator : {Integrator::explicit_substeps, Integrator::vertex_block_descent}) {
+    Scene scene = elastic_scene();
+    scene.organs[0].integrator = integrator;
+    Timeline with(scene), without(scene);
+    without.set_forces_wanted(false);
+    double largest = 0.0;
+    for (const StampedPose& pose : press()) {
+      with.add_pose(0, pose);
+      without.add_pose(0, pose);
+      while (with.step()) {
+        ASSERT_TRUE(without.step());
+        ASSERT_EQ(with.hash(), without.hash());
+        ASSERT_EQ(with.report().contacts.size(), without.report().contacts.size());
+        largest = std::max(largest, with.report().wrenches[0].force.norm());
+        EXPECT_EQ(without.report().wrenches[0].force, Vector3(0, 0, 0));
+        for (const OrganContact& contact : without.report().contacts) EXPECT_EQ(contact.force, Vector3(0, 0, 0));
+      }
+    }
+    EXPECT_GT(largest, 0.01) << to_string(integrator);
+  }
+}
+
 TEST(Timeline, HostilePosesNeverMakeAReportNonFinite) {
   Scene scene = quick_scene();
   scene.instruments[0].parts[0].mesh = make_box({0.02, 0.03, 0.025});

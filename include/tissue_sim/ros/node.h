@@ -62,6 +62,7 @@ class Node {
 
   void advertise();
   bool take_poses();
+  bool forces_wanted() const;
   void give_pose(std::size_t instrument, const FramedPose& pose);
   void step_while_poses_allow();
   void hold_in_realtime();

@@ -21,6 +21,7 @@ struct InstrumentMotion {
 struct Motion {
   double duration = 0.0;  ///< s
   std::vector<InstrumentMotion> instruments;
+  bool forces_wanted = true;  ///< false: contacts and wrenches carry none; nothing else differs
 };
 
 /// Room for one organ's step. Holds nothing that changes what the next step does: how far the tree's boxes have been

@@ -89,6 +89,10 @@ class Timeline {
   /// Makes the next step towards `until` (ns) with the last poses held. False once `until` is reached.
   bool step_holding(std::int64_t until);
 
+  /// From the next step on: false leaves the forces of contacts and wrenches zero, which spares their time. Positions,
+  /// depths and the hash are the same either way.
+  void set_forces_wanted(bool wanted);
+
   /// Puts one organ, or all for -1, back to its rest shape.
   void reset(int organ);
 
