@@ -34,7 +34,7 @@ constexpr int finer_in_reference = 10;
 constexpr double slide_speed = 0.01;                        // m/s
 constexpr std::int64_t slide_turn = 20 * millisecond;       // ns, there and back again
 constexpr std::int64_t timed_batch = 20 * millisecond;      // ns
-constexpr int timed_batches = 5;                            // of which the median counts
+constexpr int timed_batches = 3;                            // of which the median counts
 constexpr int timed_rounds = 3;                             // of which the least counts
 constexpr std::int64_t recording_batch = 50 * millisecond;  // ns
 
@@ -273,14 +273,13 @@ class Study {
     places_.resize(given.meshes.size());
   }
 
-  std::vector<StudyRow> rows() {
+  void run(const std::function<void(const StudyRow&)>& done) {
     find_fine_reference();
-    std::vector<StudyRow> result;
-    for (const StudyRun& run : given_.runs) {
-      result.push_back(measure(run));
-      tell(result.back());
+    for (const StudyRun& each : given_.runs) {
+      const StudyRow row = measure(each);
+      tell(row);
+      done(row);
     }
-    return result;
   }
 
  private:
@@ -513,8 +512,9 @@ class Study {
 
 }  // namespace
 
-std::vector<StudyRow> run_study(const StudyCase& given, std::FILE* progress, bool timed) {
-  return Study(given, progress, timed).rows();
+void run_study(const StudyCase& given, std::FILE* progress, const std::function<void(const StudyRow&)>& done,
+               bool timed) {
+  Study(given, progress, timed).run(done);
 }
 
 }  // namespace tissue_sim

@@ -290,15 +290,13 @@ StudyCase sphere_into_block(bool quick) {
   }
   result.reference.mesh = add_mesh(result, own_surface("graded 0.6 mm", graded_block(0.0006)));
   const int design = add_mesh(result, own_surface("uniform 1.5 mm", uniform_block(10)));
-  for (const Model model : models) add_every_way(result.runs, design, model);
+  for (const Model model : {Model::fem, Model::volume}) add_every_way(result.runs, design, model);
   for (const auto& [name, solid] :
        {std::make_pair("uniform 3.75 mm", uniform_block(4)), std::make_pair("uniform 1.9 mm", uniform_block(8)),
-        std::make_pair("graded 1.5 mm", graded_block(0.0015)), std::make_pair("graded 1 mm", graded_block(0.001)),
-        std::make_pair("uniform 0.94 mm", uniform_block(16))}) {
+        std::make_pair("graded 1.5 mm", graded_block(0.0015)), std::make_pair("graded 1 mm", graded_block(0.001))}) {
     const int mesh = add_mesh(result, own_surface(name, solid));
     for (const Model model : models) add_usual_ways(result.runs, mesh, model);
   }
-  for (const Model model : {Model::volume, Model::fem}) add_usual_ways(result.runs, result.reference.mesh, model);
 
   // A fine surface in coarser solids.
   const TriangleMesh surface_1 = own_surface("", uniform_block(14)).surface;
@@ -314,6 +312,10 @@ StudyCase sphere_into_block(bool quick) {
   }
   const int large = add_mesh(result, surface_only("surface 0.27 mm", surface_quarter));
   add_usual_ways(result.runs, large, Model::contact_only);
+  for (const Model model : {Model::contact_only, Model::surface}) add_every_way(result.runs, design, model);
+  const int fine = add_mesh(result, own_surface("uniform 0.94 mm", uniform_block(16)));
+  for (const Model model : models) add_usual_ways(result.runs, fine, model);
+  for (const Model model : {Model::volume, Model::fem}) add_usual_ways(result.runs, result.reference.mesh, model);
   return result;
 }
 

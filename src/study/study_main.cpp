@@ -8,6 +8,7 @@
 #include <climits>
 #include <cstdio>
 #include <fstream>
+#include <tuple>
 
 #include "tissue_sim/scene/resource_path.h"
 #include "tissue_sim/study/study_cases.h"
@@ -79,24 +80,22 @@ std::vector<StampedPose> read_poses(const std::string& path) {
   return poses;
 }
 
-std::vector<StudyRow> run_cases(const Arguments& arguments, const std::string& config) {
-  std::vector<StudyRow> rows;
+void write(const std::string& path, const std::string& content) {
+  std::ofstream file(path, std::ios::binary);
+  file << content;
+  if (!file.flush()) throw std::runtime_error(path + ": cannot be written: check the folder and its rights");
+}
+
+void run_cases(const Arguments& arguments, const std::string& config,
+               const std::function<void(const StudyRow&)>& done) {
   for (const std::string& name : case_names) {
     if (!arguments.only.empty() && name != arguments.only) continue;
     StudyCase given;
     if (name == case_names[0]) given = sphere_into_block(arguments.quick);
     if (name == case_names[1]) given = probe_into_organ(arguments.quick, config);
     if (name == case_names[2]) given = demo_recording(arguments.quick, config, read_poses(config + "/demo.bag"));
-    const std::vector<StudyRow> more = run_study(given, stderr);
-    rows.insert(rows.end(), more.begin(), more.end());
+    run_study(given, stderr, done);
   }
-  return rows;
-}
-
-void write(const std::string& path, const std::string& content) {
-  std::ofstream file(path, std::ios::binary);
-  file << content;
-  if (!file.flush()) throw std::runtime_error(path + ": cannot be written: check the folder and its rights");
 }
 
 bool run(const std::vector<std::string>& words) {
@@ -128,11 +127,15 @@ void study(const Arguments& arguments) {
   const std::string program = this_program();
   const std::string scene = resolve_path("package://tissue_sim/config/scenes/demo.yaml", program);
   const std::string config = scene.substr(0, scene.rfind("/scenes/"));
-  const std::vector<StudyRow> rows = run_cases(arguments, config);
   const std::string command = std::string("tissue_sim_study --out DIR") + (arguments.quick ? " --quick" : "") +
                               (arguments.only.empty() ? "" : " --case " + arguments.only);
+  const std::string json = arguments.out + "/study.json";
+  std::vector<StudyRow> rows;
+  run_cases(arguments, config, [&](const StudyRow& row) {  // an hour's work is not lost with its end
+    rows.push_back(row);
+    write(json, study_json(rows, command, machine()));
+  });
   const std::string tables = study_tables(rows, command, machine());
-  write(arguments.out + "/study.json", study_json(rows, command, machine()));
   write(arguments.out + "/tables.md", tables);
   write(arguments.out + "/accuracy.yaml", accuracy_table(rows, command, machine()));
   std::fputs(tables.c_str(), stdout);

@@ -28,6 +28,13 @@ StudyCase on_one_mesh(int cells, const std::vector<StudyRun>& runs) {
   return given;
 }
 
+std::vector<StudyRow> rows_of(const StudyCase& given) {
+  std::vector<StudyRow> rows;
+  run_study(
+      given, nullptr, [&](const StudyRow& row) { rows.push_back(row); }, false);
+  return rows;
+}
+
 StudyRun run_of(Model model, Integrator integrator) {
   StudyRun run;
   run.model = model;
@@ -40,7 +47,7 @@ TEST(AccuracyStudy, FemRestsWhereTheStaticSolutionIsAndVolumeNearIt) {
       10, {run_of(Model::fem, Integrator::explicit_substeps), run_of(Model::fem, Integrator::vertex_block_descent),
            run_of(Model::volume, Integrator::explicit_substeps)});
   given.transient_at = 0;
-  const std::vector<StudyRow> rows = run_study(given, nullptr, false);
+  const std::vector<StudyRow> rows = rows_of(given);
   ASSERT_EQ(rows.size(), 3u);
   for (const StudyRow& row : rows) {
     EXPECT_TRUE(row.stable);
@@ -66,8 +73,8 @@ TEST(AccuracyStudy, ErrorsComeOutTheSameAgain) {
     }
   }
   given.hold = 60'000'000;
-  const std::vector<StudyRow> first = run_study(given, nullptr, false);
-  const std::vector<StudyRow> second = run_study(given, nullptr, false);
+  const std::vector<StudyRow> first = rows_of(given);
+  const std::vector<StudyRow> second = rows_of(given);
   EXPECT_EQ(study_json(first, "", ""), study_json(second, "", ""));
   for (std::size_t i = 0; i < first.size(); ++i) {
     SCOPED_TRACE(i);
@@ -84,7 +91,7 @@ TEST(AccuracyStudy, FinerSubstepsAreNearerToTheFinest) {
   finer.finer = 4;
   StudyCase given = on_one_mesh(4, {run_of(Model::fem, Integrator::explicit_substeps), finer});
   given.reference_is_proven = false;
-  const std::vector<StudyRow> rows = run_study(given, nullptr, false);
+  const std::vector<StudyRow> rows = rows_of(given);
   EXPECT_GE(rows[1].substeps, 4 * rows[0].substeps - 3);
   EXPECT_LT(rows[1].transient_error, 0.5 * rows[0].transient_error);
   EXPECT_GT(rows[1].transient_error, 0.0);

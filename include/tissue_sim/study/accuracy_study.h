@@ -75,8 +75,9 @@ struct StudyRow {
   bool at_rest = false;  ///< errors after settling; false: of a recording
 };
 
-/// Every run of the case. Errors come out the same each time, bit for bit; the times are those of this machine.
-/// `progress` may be null. `timed`: false leaves the times 0.
-std::vector<StudyRow> run_study(const StudyCase& given, std::FILE* progress, bool timed = true);
+/// Every run of the case, given to `done` as it is made. Errors come out the same each time, bit for bit; the times are
+/// those of this machine. `progress` may be null. `timed`: false leaves the times 0.
+void run_study(const StudyCase& given, std::FILE* progress, const std::function<void(const StudyRow&)>& done,
+               bool timed = true);
 
 }  // namespace tissue_sim
