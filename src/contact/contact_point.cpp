@@ -51,29 +51,41 @@ ContactPoint vertex_contact(const OrganSurface& organ, int piece, int vertex, co
   return contact_at(organ, piece, triangle, weights, place, direction);
 }
 
+/// Pokes nearest to one corner of a triangle that count. With only the deepest, a triangle that rests on two vertices
+/// near one corner fell from one to the other.
+constexpr int most_pokes = 3;
+
 int nearest_corner(const ContactPoint& point) {
   int corner = 0;
   point.weights.maxCoeff(&corner);
   return corner;
 }
 
-/// Among the points from `first` on, which are all pokes: takes the place of the one nearest to the same corner of the
-/// same triangle, if it is deeper.
+/// Among the points from `first` on, which are all pokes: takes the place of the shallowest of those nearest to the
+/// same corner of the same triangle, if there are enough and it is deeper.
 void keep_deepest(const OrganSurface& organ, const ContactPoint& poke, bool poked_before, std::size_t first,
                   Clearance& clearance, std::vector<ContactPoint>& points) {
   const auto depth = [&](const ContactPoint& point, bool held) {
     return point.target - point.direction.dot(at_point(point, organ.positions)) + (held ? hold : 0.0);
   };
-  std::size_t i = first;
   const int corner = nearest_corner(poke);
-  while (i < points.size() && (points[i].triangle != poke.triangle || nearest_corner(points[i]) != corner)) ++i;
-  if (i == points.size()) {
+  int there = 0;
+  std::size_t shallowest = points.size();
+  double least = 0.0;
+  for (std::size_t i = first; i < points.size(); ++i) {
+    if (points[i].triangle != poke.triangle || nearest_corner(points[i]) != corner) continue;
+    const double deep = depth(points[i], clearance.pokes[points[i].poking] == 2);
+    if (there++ == 0 || deep < least) {
+      shallowest = i;
+      least = deep;
+    }
+  }
+  if (there < most_pokes) {
     points.push_back(poke);
   } else {
-    char& other = clearance.pokes[points[i].poking];
-    if (!(depth(poke, poked_before) > depth(points[i], other == 2))) return;
-    other = 0;
-    points[i] = poke;
+    if (!(depth(poke, poked_before) > least)) return;
+    clearance.pokes[points[shallowest].poking] = 0;
+    points[shallowest] = poke;
   }
   clearance.pokes[poke.poking] = poked_before ? 2 : 1;
 }

@@ -87,8 +87,8 @@ struct Clearance {
 /// point at a vertex. Where the surface is folded into itself it has no inside, so what would push against the
 /// instrument's own normal, or is deeper than it can have come since it was outside, is no poke.
 ///
-/// A flat triangle is kept out by few of them: for each of its corners the deepest of those that are nearest to it. A
-/// finely meshed ball on 2.5 mm edges gave 120 points, far too many for the rounds of the response, and 20 are left.
+/// A flat triangle is kept out by few of them: for each of its corners the three deepest of those that are nearest to
+/// it.
 ///
 /// Looks at `vertices` of the instrument only: where it is curved no more sharply than a few organ edges, colliding
 /// vertices are dense enough, and what it reaches between them is a small part of an edge.
