@@ -9,8 +9,8 @@ namespace {
 
 /// Points that share vertices disturb each other; this many rounds leave less than the contact margin. With 8, ten
 /// pokes of a ball into a block went on approaching it at 5 mm/s for ever, and were pushed out as far again.
-constexpr int rounds = 32;
-constexpr double impulse_tolerance = 1e-4;
+constexpr int rounds = 100;
+constexpr double impulse_tolerance = 1e-5;
 
 /// Forces are shown, and nothing else depends on them: they may take longer, and stop where nothing changes any more.
 constexpr int rounds_for_forces = 200;

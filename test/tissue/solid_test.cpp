@@ -95,7 +95,7 @@ TEST(Solid, OfVolumeResistsCompressionWithItsBulkModulusOnAnyMesh) {
   for (const TetrahedralMesh& block : {make_block(size, cells), uneven_block(), make_block(size, {2, 5, 3})}) {
     const RestShape shape = build_rest_shape(solid_organ(block, size, Model::volume));
     EXPECT_GT(shape.stiffness_correction, 0.5);
-    EXPECT_LT(shape.stiffness_correction, 1.1);
+    EXPECT_LT(shape.stiffness_correction, 1.3);
     for (const double strain : {0.1, -0.1}) {
       const double change = std::pow(1.0 + strain, 3) - 1.0;
       const double exact = shape.stiffness_correction * size.prod() *
