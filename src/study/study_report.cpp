@@ -27,8 +27,8 @@ std::string json_row(const StudyRow& row) {
                to_string(row.run.model), to_string(row.run.integrator), row.run.time_step, row.substeps);
   line += text("\"depth\": \"%s\", \"restoration\": %s, \"active_vertices\": %d, \"vertices\": %d, ",
                to_string(row.run.depth), truth(row.run.restoration), row.active_vertices, row.vertices);
-  line += text("\"tetrahedra\": %d, \"edge\": %s, \"contact_radius\": %s, ", row.tetrahedra, number(row.edge).c_str(),
-               number(row.contact_radius).c_str());
+  line += text("\"tetrahedra\": %d, \"embedded\": %s, \"edge\": %s, \"contact_radius\": %s, ", row.tetrahedra,
+               truth(row.embedded), number(row.edge).c_str(), number(row.contact_radius).c_str());
   line += text("\"ms_per_ms\": %s, \"reference\": \"%s\", ", number(row.ms_per_ms).c_str(),
                std::isfinite(row.displacement_error) ? "fine mesh" : "same mesh");
   line +=

@@ -61,6 +61,7 @@ struct StudyRow {
   int active_vertices = 0;
   int vertices = 0;  ///< of the surface
   int tetrahedra = 0;
+  bool embedded = false;        ///< the surface is carried by the tetrahedra
   double edge = 0.0;            ///< m, mean of the simulated mesh around the contact
   double contact_radius = 0.0;  ///< m
   double ms_per_ms = 0.0;
