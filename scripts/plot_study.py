@@ -16,7 +16,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 ERRORS = (("displacement", "displacement_error", "error in displacement at rest, % of the surface's"),
           ("force", "force_error", "error in force, %"),
           ("transient", "transient_error", "error in displacement while being pressed, %"))
-RECORDING = {"displacement_error": "error in displacement where the force is greatest, % of the surface's",
+RECORDING = {"displacement_error": "error in displacement at the greatest force, %",
              "force_error": "error in force along the recording, % of its peak"}
 TITLES = {"sphere_into_block": "Ball of 6 mm, 2 mm into a block", "probe_into_organ": "Probe, 10 mm into the liver",
           "demo_recording": "The demonstration's recording"}
@@ -40,7 +40,7 @@ def front(points):
 def name(row):
     words = [f"{row['model']}, {row['mesh']}"]
     if row["model"] != "contact_only":
-        words.append(f"{SHORT[row['integrator']]}, {1e3 * row['time_step']:g} ms")
+        words.append(f"{SHORT[row['integrator']]}, {1e3 * row['time_step']:g}\u00a0ms")
     if row["depth"] == "paper":
         words.append("depth of the paper")
     if not row["restoration"]:
@@ -62,7 +62,8 @@ def draw(case, rows, key, label, path):
         usual = row["depth"] == "exact" and row["restoration"]
         colour = COLOURS[row["model"]]
         axis.plot(time, 100 * error, marker=MARKERS[row["integrator"]] if usual else "x", markersize=7, color=colour,
-                  markerfacecolor="white" if row["embedded"] else colour, markeredgewidth=1.4, linestyle="none", zorder=3)
+                  markerfacecolor="white" if row["embedded"] else colour, markeredgewidth=1.4,
+                  linestyle="none", zorder=3)
     best = front(points) if key != "transient_error" else []  # each model by itself: nothing beats another
     if best:
         axis.step([p[0] for p in best], [100 * p[1] for p in best], where="post", color="black", linewidth=1.0,

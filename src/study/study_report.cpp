@@ -1,6 +1,10 @@
 #include "tissue_sim/study/study_report.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
+#include <tuple>
 
 #include "tissue_sim/study/json_rows.h"
 
@@ -91,18 +95,21 @@ std::string accuracy_table(const std::vector<StudyRow>& rows, const std::string&
       "displacement\n# over the surface, force along the press.\n",
       command.c_str(), machine.c_str());
   result += "rows:\n";
-  const std::string* current = nullptr;
+  // Of what has the same edges, as an own surface and an embedded one have, the worse counts.
+  std::map<std::tuple<Model, Integrator, std::string>, std::array<double, 2>> errors;
   for (const StudyRow& row : rows) {
     const StudyRun& run = row.run;
     const bool usual = run.depth == DepthScheme::exact && run.restoration && run.finer == 1 && run.time_step == 0.001;
     if (!usual || !row.at_rest || !row.stable || !std::isfinite(row.displacement_error)) continue;
-    if (current == nullptr || *current != row.case_name) {
-      current = &row.case_name;
-      result += "  # " + row.case_name + "\n";
-    }
-    result += text("  - {model: %s, integrator: %s, edges: %.3g, displacement_error: %.3g, force_error: %.3g}\n",
-                   to_string(run.model), to_string(run.integrator), row.edge / row.contact_radius,
-                   row.displacement_error, row.force_error);
+    const std::string edges = text("%8.3f", row.edge / row.contact_radius);  // sorts as the number does
+    std::array<double, 2>& worst = errors[{run.model, run.integrator, edges}];
+    worst = {std::max(worst[0], row.displacement_error), std::max(worst[1], row.force_error)};
+  }
+  for (const auto& [key, worst] : errors) {
+    const auto& [model, integrator, edges] = key;
+    result +=
+        text("  - {model: %s, integrator: %s, edges: %s, displacement_error: %.3g, force_error: %.3g}\n",
+             to_string(model), to_string(integrator), edges.c_str() + edges.find_first_not_of(' '), worst[0], worst[1]);
   }
   return result;
 }

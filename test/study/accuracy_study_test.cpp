@@ -111,8 +111,13 @@ TEST(AccuracyStudy, TheReportHasARowForEachAndNullWhereNothingWasComputed) {
   EXPECT_NE(json.find("\"transient_error\": null"), std::string::npos);
   EXPECT_EQ(json.find("nan"), std::string::npos);
   const std::string line =
-      "  - {model: fem, integrator: explicit, edges: 0.5, displacement_error: 0.125, force_error: 0.25}\n";
+      "  - {model: fem, integrator: explicit, edges: 0.500, displacement_error: 0.125, force_error: 0.25}\n";
   EXPECT_NE(accuracy_table({row}, "command", "machine").find(line), std::string::npos);
+  StudyRow worse = row;
+  worse.displacement_error = 0.5;
+  const std::string both = accuracy_table({row, worse}, "command", "machine");
+  EXPECT_EQ(both.find(line), std::string::npos);
+  EXPECT_NE(both.find("displacement_error: 0.5, force_error: 0.25"), std::string::npos);
   row.run.restoration = false;
   EXPECT_EQ(accuracy_table({row}, "command", "machine").find("model:"), std::string::npos);
 }
