@@ -147,7 +147,9 @@ double integrate_elements(StepContext& context) {
   element_forces(model.rest, state, state.forces, work.elements);
   accelerate(model, context.world.gravity, context.dt, state.forces, state);
   stop_at_instrument(work.points, model.rest.inverse_mass, state.positions, context.dt, state.velocities);
-  return advance(model, context.dt, state);
+  const double speed = advance(model, context.dt, state);
+  state.stiffening = stiffening(model.rest, model.tetrahedra_at, work.points, state.positions);
+  return speed;
 }
 
 /// What has moved by itself: the tree and the clearances have to know.
@@ -240,7 +242,8 @@ int count_substeps(StepContext& context) {
   const double cuts = std::ceil(farthest / model.motion_limit);
   const int for_motion = cuts <= most_motion_substeps ? static_cast<int>(cuts) : 1;
   const bool one_is_enough = model.integrator == Integrator::vertex_block_descent || (context.state.asleep && !near);
-  const int for_elements = one_is_enough ? 1 : substeps_for(model.rest, context.motion.duration);
+  const int for_elements =
+      one_is_enough ? 1 : substeps_for(model.rest, context.motion.duration, context.state.stiffening);
   const int substeps = std::max({1, for_motion, for_elements});
   context.dt = context.motion.duration / substeps;
   context.report.substeps = std::max(context.report.substeps, substeps);

@@ -15,24 +15,6 @@ constexpr double sweep_period = 1e-3;
 /// vertices in the places where the first sweep put them.
 constexpr double shared_stiffness = 2.0;
 
-template <class Kind>
-FlatLists corners_of(const std::vector<Kind>& elements, std::size_t vertices) {
-  FlatLists lists;
-  if (elements.empty()) return lists;
-  lists.first.assign(vertices + 1, 0);
-  for (const Kind& element : elements) {
-    for (const int vertex : element.vertices) ++lists.first[vertex + 1];
-  }
-  for (std::size_t v = 0; v < vertices; ++v) lists.first[v + 1] += lists.first[v];
-  lists.items.resize(static_cast<std::size_t>(lists.first.back()));
-  std::vector<int> next(lists.first.begin(), lists.first.end() - 1);
-  int item = 0;
-  for (const Kind& element : elements) {
-    for (const int vertex : element.vertices) lists.items[next[vertex]++] = item++;
-  }
-  return lists;
-}
-
 /// Constraint elements at vertex v. Damped along their gradient by what all their vertices moved since the start.
 template <class Kind>
 void add_elements(const std::vector<Kind>& elements, const FlatLists& at, int v, const std::vector<Vector3>& positions,

@@ -96,6 +96,10 @@ World build_world(const Scene& scene) {
     } else {
       refuse_if_too_stiff(scene, organ, model.rest);
       model.rest.packed = pack(model.rest.tetrahedra);
+      if (!model.rest.tetrahedra.empty()) {
+        model.tetrahedra_at = corners_of(model.rest.tetrahedra, model.rest.positions.size());
+        for (int& corner : model.tetrahedra_at.items) corner /= 4;
+      }
     }
     world.organs.push_back(std::move(model));
   }

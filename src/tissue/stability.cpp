@@ -109,11 +109,23 @@ double stiffest_of(const std::vector<Kind>& elements, const RestShape& shape, co
   return stiffest;
 }
 
+double stiffest_of(const std::vector<NeoHookeanElement>& elements, const RestShape& shape,
+                   const std::vector<Vector3>& positions) {
+  double stiffest = 0.0;
+  for (const NeoHookeanElement& element : elements) {
+    const NeoHookeanElement::Vectors x = gather(element, positions);
+    for (std::size_t i = 0; i < 4; ++i) {
+      stiffest = std::max(stiffest, element.stiffness(x, i) * shape.inverse_mass[element.vertices[i]]);
+    }
+  }
+  return stiffest;
+}
+
 }  // namespace
 
 double stiffest_element(const RestShape& shape, const std::vector<Vector3>& positions) {
   return std::max({stiffest_of(shape.distances, shape, positions), stiffest_of(shape.areas, shape, positions),
-                   stiffest_of(shape.volumes, shape, positions)});
+                   stiffest_of(shape.volumes, shape, positions), stiffest_of(shape.tetrahedra, shape, positions)});
 }
 
 void apply_mass_floor(double fraction, RestShape& shape) {

@@ -1,12 +1,19 @@
 #pragma once
 
+#include "tissue_sim/contact/contact_point.h"
 #include "tissue_sim/simulation/state.h"
 
 namespace tissue_sim {
 
-/// How many substeps a step of `duration` (s) takes: as many as the stable substep asks for; 1 where nothing is
-/// integrated.
-int substeps_for(const RestShape& rest, double duration);
+/// How many substeps a step of `duration` (s) takes: as many as the stable substep asks for, more where a solid has
+/// been `stiffening` (see below); 1 where nothing is integrated.
+int substeps_for(const RestShape& rest, double duration, double stiffening = 1.0);
+
+/// How much stiffer than the stiffest tetrahedron at rest the stiffest at a contact is now, as squared frequency. Where
+/// a thin instrument presses deep into small tetrahedra that is far beyond what the substep at rest is stable for.
+/// `tetrahedra_at` lists the tetrahedra at each vertex.
+double stiffening(const RestShape& rest, const FlatLists& tetrahedra_at, const std::vector<ContactPoint>& points,
+                  const std::vector<Vector3>& positions);
 
 /// Room for element_forces(), one entry a vertex; empty where the organ's elements need none.
 struct ElementRoom {

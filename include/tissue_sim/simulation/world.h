@@ -29,6 +29,7 @@ struct OrganModel {
   double drag = 0.0;                                      ///< 1/s
   Integrator integrator = Integrator::explicit_substeps;  ///< never automatic
   std::string integrator_reason;
+  FlatLists tetrahedra_at;               ///< per vertex, of an explicit `fem`, else empty
   Incidence incidence;                   ///< for vertex block descent, else empty
   std::vector<std::vector<int>> poking;  ///< per piece: its vertices that may poke into a triangle of this organ
   double motion_limit = 0.0;             ///< m, the farthest an instrument may move between two contact passes

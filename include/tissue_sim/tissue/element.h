@@ -36,6 +36,25 @@ ElementVectors<Kind> gather(const Kind& element, const std::vector<Vector3>& of_
   return of_element;
 }
 
+/// The corners at each vertex, ascending: an item is the element's index times the kind's size, plus the corner.
+template <class Kind>
+FlatLists corners_of(const std::vector<Kind>& elements, std::size_t vertices) {
+  FlatLists lists;
+  if (elements.empty()) return lists;
+  lists.first.assign(vertices + 1, 0);
+  for (const Kind& element : elements) {
+    for (const int vertex : element.vertices) ++lists.first[vertex + 1];
+  }
+  for (std::size_t v = 0; v < vertices; ++v) lists.first[v + 1] += lists.first[v];
+  lists.items.resize(static_cast<std::size_t>(lists.first.back()));
+  std::vector<int> next(lists.first.begin(), lists.first.end() - 1);
+  int item = 0;
+  for (const Kind& element : elements) {
+    for (const int vertex : element.vertices) lists.items[next[vertex]++] = item++;
+  }
+  return lists;
+}
+
 /// What bounds the stiffness of stretched elements: areas and volumes stiffen with every stretch, and a substep that is
 /// stable at rest is not for ever. k sum |grad_i C|^2 / m_i, the square of the frequency of the element alone, counts
 /// up to `stiffest` only: an element beyond it is softened to it.

@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <array>
+#include <cmath>
 #include <cstddef>
 
 #include "tissue_sim/geometry/triangle_mesh.h"
@@ -103,6 +104,17 @@ struct NeoHookeanElement {
     return result;
   }
   Matrix3 block(const Vectors& x, std::size_t corner) const { return local(x, corner).block; }
+
+  /// How stiffly the tetrahedron holds the corner, N/m: the largest eigenvalue of its block, and what volume that is
+  /// lost or won adds between corners. Grows where the tetrahedron is stretched or pressed flat.
+  double stiffness(const Vectors& x, std::size_t corner) const {
+    const Matrix3 f = deformation_gradient(x);
+    const Matrix3 c = cofactors(f);
+    const Vector3 g = shape_gradient(corner);
+    const double stiff = moduli.lambda + moduli.mu;
+    const double stretch = f.col(0).dot(c.col(0)) - 1.0;
+    return volume * ((moduli.mu + std::abs(stiff * stretch)) * g.squaredNorm() + stiff * (c * g).squaredNorm());
+  }
 
   /// Second derivative of the energy by corners i (rows) and j (columns), N/m. Exact, so not always positive definite.
   Matrix3 block(const Vectors& x, std::size_t i, std::size_t j) const {
