@@ -2,29 +2,34 @@
 #include <cstdio>
 #include <string>
 
+#include "tissue_sim/study/element_bench.h"
 #include "tissue_sim/study/json_rows.h"
 #include "tissue_sim/study/paper_accuracy.h"
+#include "tissue_sim/tissue/neo_hookean_batch.h"
 
 namespace {
 
 using namespace tissue_sim;
 
 constexpr const char* usage =
-    "usage: tissue_sim_bench paper [--accuracy] [--json FILE]\n"
+    "usage: tissue_sim_bench paper|elements [--accuracy] [--json FILE]\n"
     "  paper             Table 1 of the paper: 9 pairs of spheres, 3 approaches, milliseconds a collision step\n"
     "  paper --accuracy  its depths, directions and colliding vertices against exact ones\n"
+    "  elements          ns a tetrahedron: the forces of a substep, or a sweep of vertex block descent\n"
     "  --json FILE       write the rows to FILE\n";
 
 struct Arguments {
+  std::string bench;
   bool accuracy = false;
   std::string json;
 };
 
 bool read_arguments(int argc, char** argv, Arguments& arguments) {
-  if (argc < 2 || std::string(argv[1]) != "paper") return false;
+  arguments.bench = argc > 1 ? argv[1] : "";
+  if (arguments.bench != "paper" && arguments.bench != "elements") return false;
   for (int i = 2; i < argc; ++i) {
     const std::string word = argv[i];
-    if (word == "--accuracy") {
+    if (word == "--accuracy" && arguments.bench == "paper") {
       arguments.accuracy = true;
     } else if (word == "--json" && i + 1 < argc) {
       arguments.json = argv[++i];
@@ -119,10 +124,23 @@ JsonRows bench_accuracy() {
   return json;
 }
 
+JsonRows bench_elements() {
+  JsonRows json;
+  std::printf("A block of cut cubes, one core, registers: %s\n\n", name(instruction_set()));
+  std::printf("model   integrator            tetrahedra  ns a tetrahedron\n");
+  for (const ElementCost& cost : time_elements()) {
+    const double ns = 1e9 * cost.seconds / cost.tetrahedra;
+    std::printf("%-6s  %-20s  %10d  %16.1f\n", to_string(cost.model), to_string(cost.integrator), cost.tetrahedra, ns);
+    json.add(text("\"model\": \"%s\", \"integrator\": \"%s\", \"tetrahedra\": %d, \"ns_per_tetrahedron\": %.6g",
+                  to_string(cost.model), to_string(cost.integrator), cost.tetrahedra, ns));
+  }
+  return json;
+}
+
 bool write_json(const std::string& path, const Arguments& arguments, const JsonRows& json) {
   std::FILE* file = std::fopen(path.c_str(), "w");
   if (!file) return false;
-  std::fprintf(file, "{\n  \"bench\": \"paper\",\n  \"accuracy\": %s,\n  \"rows\": [%s\n  ]\n}\n",
+  std::fprintf(file, "{\n  \"bench\": \"%s\",\n  \"accuracy\": %s,\n  \"rows\": [%s\n  ]\n}\n", arguments.bench.c_str(),
                arguments.accuracy ? "true" : "false", json.rows.c_str());
   return std::fclose(file) == 0;
 }
@@ -139,7 +157,9 @@ int main(int argc, char** argv) {
     std::fputs(usage, stderr);
     return 2;
   }
-  const JsonRows json = arguments.accuracy ? bench_accuracy() : bench_table_1();
+  const JsonRows json = arguments.bench == "elements" ? bench_elements()
+                        : arguments.accuracy          ? bench_accuracy()
+                                                      : bench_table_1();
   if (!arguments.json.empty() && !write_json(arguments.json, arguments, json)) {
     std::fprintf(stderr, "tissue_sim_bench: %s cannot be written: check the folder and its rights\n",
                  arguments.json.c_str());
