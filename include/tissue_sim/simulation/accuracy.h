@@ -27,8 +27,8 @@ AccuracyTable load_accuracy_table(const std::string& scene_file);
 /// their range that of the nearest row. Infinite where the model was never measured.
 double expected_error(const AccuracyTable& table, Model model, Integrator integrator, double edges);
 
-/// Mean edge of what is integrated (the solid, else the surface) over the contact radius: half of the thinnest extent
-/// of a piece of the scene's instruments.
+/// Mean edge of what is integrated (the solid, else the surface) where it is finest, over the contact radius: half of
+/// the thinnest extent of a piece of the scene's instruments. A mesh is fine where its contact is expected.
 double relative_edges(const Organ& organ, const std::vector<Instrument>& instruments);
 
 /// What is known of an alternative when one of them is to be chosen.
@@ -60,7 +60,7 @@ struct ModelChoice {
   std::vector<std::string> rejected;  ///< one line each
 };
 
-/// `organ liver: fem on liver_8.msh, explicit: expected error 4.1 %, 0.62 ms a step: why`
+/// `organ liver: fem on liver_fine.msh, explicit: expected error 4.1 %, 0.62 ms a step: why`
 std::string to_text(const ModelChoice& choice);
 
 /// What a scene with one organ costs a step.
