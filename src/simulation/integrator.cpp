@@ -49,7 +49,7 @@ int substeps_for(const RestShape& rest, double duration, double stiffening) {
 
 double stiffening(const RestShape& rest, const FlatLists& tetrahedra_at, const std::vector<ContactPoint>& points,
                   const std::vector<Vector3>& positions) {
-  if (rest.packed.batches.empty()) return 1.0;
+  if (rest.packed.batches.empty()) return 0.0;
   double stiffest = 0.0;
   for (const ContactPoint& point : points) {
     for (int i = 0; i < point.bearers.count; ++i) {

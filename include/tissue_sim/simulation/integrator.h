@@ -6,8 +6,8 @@
 namespace tissue_sim {
 
 /// How many substeps a step of `duration` (s) takes: as many as the stable substep asks for, more where a solid has
-/// been `stiffening` (see below); 1 where nothing is integrated.
-int substeps_for(const RestShape& rest, double duration, double stiffening = 1.0);
+/// been `stiffening` (see below; 0: has no contact); 1 where nothing is integrated.
+int substeps_for(const RestShape& rest, double duration, double stiffening = 0.0);
 
 /// How much stiffer than the stiffest tetrahedron at rest the stiffest at a contact is now, as squared frequency. Where
 /// a thin instrument presses deep into small tetrahedra that is far beyond what the substep at rest is stable for.

@@ -26,7 +26,7 @@ struct OrganState {
   std::vector<std::vector<int>> touching;    ///< per piece: vertices that were in contact in the last substep
   std::vector<Clearance> clearances;         ///< per piece
   std::vector<PlaceForce> pressing;          ///< vertex block descent starts from them
-  double stiffening = 1.0;                   ///< of an explicit solid in the last substep; see stiffening()
+  double stiffening = 0.0;                   ///< of an explicit solid in the last substep; see stiffening()
   bool asleep = true;                        ///< at rest and untouched: nothing to integrate
 
   bool holds(std::size_t vertex) const { return !held.empty() && held[vertex] != 0; }
