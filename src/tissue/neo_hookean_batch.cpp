@@ -4,29 +4,11 @@
 #include <stdexcept>
 #include <string>
 
-#ifdef __x86_64__
-#include <xmmintrin.h>
-#endif
-
-#define TISSUE_SIM_INLINE __attribute__((always_inline)) inline
+#include "lanes.h"
+#include "tissue_sim/tissue/neo_hookean_corners.h"
 
 namespace tissue_sim {
 namespace {
-
-// Vector extensions of g++ and clang: arithmetic lane by lane, in whatever registers the function has that they are
-// inlined into. They go by reference, since how wide ones are passed by value depends on the instruction set.
-// One vertex, x y z 0. As a `using` clang would drop the alignment.
-typedef float Quad __attribute__((vector_size(16), aligned(4), may_alias));  // NOLINT(modernize-use-using)
-using Four = float __attribute__((vector_size(16)));
-using Eight = float __attribute__((vector_size(32)));
-static_assert(alignof(Quad) == alignof(float), "vectors are read from and written to plain arrays");
-
-#if defined(__clang__)
-#define TISSUE_SIM_SHUFFLE(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
-#else
-using QuadIndex = int __attribute__((vector_size(16)));
-#define TISSUE_SIM_SHUFFLE(a, b, ...) __builtin_shuffle(a, b, QuadIndex{__VA_ARGS__})
-#endif
 
 constexpr std::size_t lanes = NeoHookeanBatch::lanes;
 constexpr std::size_t block = 4;               // batches that are gathered, computed and scattered together
@@ -117,11 +99,6 @@ TISSUE_SIM_INLINE void scatter(const NeoHookeanBatch& batch, std::size_t count, 
   }
 }
 
-template <class Lane>
-struct Three {
-  Lane x, y, z;
-};
-
 /// a p + b q + c r, left to right.
 template <class Lane>
 TISSUE_SIM_INLINE void combine(const Lane& a, const Three<Lane>& p, const Lane& b, const Three<Lane>& q, const Lane& c,
@@ -129,18 +106,6 @@ TISSUE_SIM_INLINE void combine(const Lane& a, const Three<Lane>& p, const Lane& 
   sum.x = a * p.x + b * q.x + c * r.x;
   sum.y = a * p.y + b * q.y + c * r.y;
   sum.z = a * p.z + b * q.z + c * r.z;
-}
-
-template <class Lane>
-TISSUE_SIM_INLINE void cross(const Three<Lane>& a, const Three<Lane>& b, Three<Lane>& product) {
-  product.x = a.y * b.z - a.z * b.y;
-  product.y = a.z * b.x - a.x * b.z;
-  product.z = a.x * b.y - a.y * b.x;
-}
-
-template <class Lane>
-TISSUE_SIM_INLINE const Lane& lane(const float* p) {
-  return *reinterpret_cast<const Lane*>(p);
 }
 
 template <class Lane>
@@ -224,20 +189,6 @@ __attribute__((target("avx2"))) void add_forces_avx2(const NeoHookeanSolid& soli
                                                      float* forces) {
   add_forces<Eight>(solid, displacements, forces);
 }
-
-/// While it lives, numbers below the smallest normal float (1e-38) count as zero. Far from a contact the squares of
-/// strains are such numbers by the thousand: a tetrahedron of them took 9.5 ns and not 6.5 on Zen 4 (baseline 18 and
-/// not 9.4), and other processors pay more.
-class TinyIsZero {
- public:
-  TinyIsZero() { _mm_setcsr(before_ | 0x8040u); }  // flush results to zero, take operands as zero
-  ~TinyIsZero() { _mm_setcsr(before_); }
-  TinyIsZero(const TinyIsZero&) = delete;
-  TinyIsZero& operator=(const TinyIsZero&) = delete;
-
- private:
-  const unsigned before_ = _mm_getcsr();
-};
 #endif
 
 }  // namespace

@@ -7,30 +7,12 @@
 #include <immintrin.h>
 #endif
 
-#define TISSUE_SIM_INLINE __attribute__((always_inline)) inline
+#include "lanes.h"
 
 namespace tissue_sim {
 namespace {
 
-// Vector extensions of g++ and clang, by reference: see neo_hookean_batch.cpp.
-// As a `using` clang would drop the alignment.
-typedef float Quad __attribute__((vector_size(16), aligned(4), may_alias));  // NOLINT(modernize-use-using)
-using Four = float __attribute__((vector_size(16)));
-using Eight = float __attribute__((vector_size(32)));
-
-#if defined(__clang__)
-#define TISSUE_SIM_SHUFFLE(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
-#else
-using QuadIndex = int __attribute__((vector_size(16)));
-#define TISSUE_SIM_SHUFFLE(a, b, ...) __builtin_shuffle(a, b, QuadIndex{__VA_ARGS__})
-#endif
-
 constexpr std::size_t lanes = CornerBatch::lanes;
-
-template <class Lane>
-struct Three {
-  Lane x, y, z;
-};
 
 /// What a vertex sees, one value a lane: its gradient and the upper half of its block.
 template <class Lane>
@@ -40,22 +22,10 @@ struct Sums {
 };
 
 template <class Lane>
-TISSUE_SIM_INLINE const Lane& lane(const float* p) {
-  return *reinterpret_cast<const Lane*>(p);
-}
-
-template <class Lane>
 TISSUE_SIM_INLINE void subtract(const Three<Lane>& a, const Three<Lane>& b, Three<Lane>& difference) {
   difference.x = a.x - b.x;
   difference.y = a.y - b.y;
   difference.z = a.z - b.z;
-}
-
-template <class Lane>
-TISSUE_SIM_INLINE void cross(const Three<Lane>& a, const Three<Lane>& b, Three<Lane>& product) {
-  product.x = a.y * b.z - a.z * b.y;
-  product.y = a.z * b.x - a.x * b.z;
-  product.z = a.x * b.y - a.y * b.x;
 }
 
 template <class Lane>
