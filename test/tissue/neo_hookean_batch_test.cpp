@@ -203,6 +203,41 @@ TEST(NeoHookeanBatch, SameBitsWhateverThePadding) {
   }
 }
 
+/// Some of the batches give what their tetrahedra alone give; what another list of batches added before stays.
+TEST(NeoHookeanBatch, SomeBatchesAreTheSameAsNoOthersThere) {
+  Block block(3);
+  block.elements.resize(block.elements.size() - 3);
+  const NeoHookeanSolid solid = pack(block.elements);
+  const std::vector<float> u = block.displacements(0.3);
+  std::vector<int> all;
+  for (std::size_t b = 0; b < solid.batches.size(); ++b) all.push_back(static_cast<int>(b));
+  for (const InstructionSet set : {InstructionSet::baseline, InstructionSet::avx2}) {
+    if (!available(set)) continue;
+    std::vector<float> forces(u.size(), 0.0f);
+    add_neo_hookean_forces(solid, all, u.data(), forces.data(), set);
+    EXPECT_TRUE(same_bits(forces, block.forces(u, set)));
+    for (const int every : {2, 3, 7}) {
+      std::vector<int> some;
+      std::vector<NeoHookeanElement> theirs;
+      for (std::size_t t = 0; t < block.elements.size(); ++t) {
+        const int b = static_cast<int>(t / NeoHookeanBatch::lanes);
+        if ((b + 1) % every != 0 && b != all.back()) continue;
+        if (some.empty() || some.back() != b) some.push_back(b);
+        theirs.push_back(block.elements[t]);
+      }
+      ASSERT_LT(some.size(), all.size());
+      std::vector<float> expected(u.size(), 0.25f);
+      add_neo_hookean_forces(pack(theirs), u.data(), expected.data(), set);
+      forces.assign(u.size(), 0.25f);
+      add_neo_hookean_forces(solid, some, u.data(), forces.data(), set);
+      EXPECT_TRUE(same_bits(forces, expected)) << every;
+    }
+  }
+  std::vector<float> none(u.size(), 0.25f);
+  add_neo_hookean_forces(solid, std::vector<int>(), u.data(), none.data());
+  EXPECT_EQ(none, std::vector<float>(u.size(), 0.25f));
+}
+
 /// Products of these displacements are below what a float holds in full; what is linear in them is not.
 TEST(NeoHookeanBatch, TinyStrainsKeepTheirLinearPartAndTheCallerKeepsItsRounding) {
   Block block(2);

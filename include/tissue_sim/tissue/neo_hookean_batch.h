@@ -52,4 +52,8 @@ const char* name(InstructionSet set);
 void add_neo_hookean_forces(const NeoHookeanSolid& solid, const float* displacements, float* forces,
                             InstructionSet set = instruction_set());
 
+/// The same for some of the batches only, by their ascending indices: the same bits as if there were no others.
+void add_neo_hookean_forces(const NeoHookeanSolid& solid, const std::vector<int>& batches, const float* displacements,
+                            float* forces, InstructionSet set = instruction_set());
+
 }  // namespace tissue_sim
