@@ -91,29 +91,56 @@ void element_forces(const RestShape& rest, const OrganState& state, std::vector<
   for (std::size_t v = 0; v < forces.size(); ++v) forces[v] -= pull * room.gradient[v];
 }
 
-void accelerate(const OrganModel& organ, const Vector3& gravity, double dt, const std::vector<Vector3>& forces,
-                OrganState& state) {
-  const double slowed = 1.0 / (1.0 + dt * organ.drag);
-  const RestShape& rest = organ.rest;
-  for (std::size_t v = static_cast<std::size_t>(rest.first_simulated); v < forces.size(); ++v) {
-    if (rest.attached[v]) continue;
-    if (state.holds(v)) {
-      state.velocities[v].setZero();
-      continue;
+void region_forces(const RestShape& rest, const std::vector<Vector3>& positions, const std::vector<Vector3>& velocities,
+                   const ActiveRegion& region, ElementRoom& room) {
+  for (const std::vector<int>* vertices : {&region.free, &region.driven}) {
+    for (const int v : *vertices) {
+      const Vector3 displacement = positions[v] - rest.positions[v] + rest.damping_time * velocities[v];
+      room.displacements[v] << displacement.cast<float>(), 0.0F;
+      room.forces[v].setZero();
     }
-    const Vector3 change = dt * (rest.inverse_mass[v] * forces[v] + gravity);
-    state.velocities[v] = slowed * (state.velocities[v] + change);
+  }
+  add_neo_hookean_forces(rest.packed, region.batches, room.displacements.front().data(), room.forces.front().data());
+}
+
+namespace {
+
+/// Calls visit(vertex) for what is integrated now.
+template <class Visit>
+void for_each_free(const RestShape& rest, const OrganState& state, Visit&& visit) {
+  if (!state.levels.empty()) {
+    for (const int v : state.region.free) {
+      if (!rest.attached[v]) visit(static_cast<std::size_t>(v));
+    }
+    return;
+  }
+  for (std::size_t v = static_cast<std::size_t>(rest.first_simulated); v < state.positions.size(); ++v) {
+    if (!rest.attached[v]) visit(v);
   }
 }
 
+}  // namespace
+
+void accelerate(const OrganModel& organ, const Vector3& gravity, double dt, const std::vector<Vector3>& forces,
+                OrganState& state) {
+  const double slowed = 1.0 / (1.0 + dt * organ.drag);
+  for_each_free(organ.rest, state, [&](std::size_t v) {
+    if (state.holds(v)) {
+      state.velocities[v].setZero();
+      return;
+    }
+    const Vector3 change = dt * (organ.rest.inverse_mass[v] * forces[v] + gravity);
+    state.velocities[v] = slowed * (state.velocities[v] + change);
+  });
+}
+
 double advance(const OrganModel& organ, double dt, OrganState& state) {
-  const RestShape& rest = organ.rest;
   double fastest = 0.0;
-  for (std::size_t v = static_cast<std::size_t>(rest.first_simulated); v < state.positions.size(); ++v) {
-    if (rest.attached[v] || state.holds(v)) continue;
+  for_each_free(organ.rest, state, [&](std::size_t v) {
+    if (state.holds(v)) return;
     state.positions[v] += dt * state.velocities[v];
     fastest = std::max(fastest, state.velocities[v].squaredNorm());
-  }
+  });
   return std::sqrt(fastest);
 }
 

@@ -144,10 +144,23 @@ double integrate_elements(StepContext& context) {
     if (context.motion.forces_wanted) bearing_forces(model, work.points, state, work.descent, state.forces);
     return speed;
   }
-  element_forces(model.rest, state, state.forces, work.elements);
+  double coarser_speed = 0.0;
+  if (model.levels.empty()) {
+    element_forces(model.rest, state, state.forces, work.elements);
+  } else {
+    coarser_speed =
+        move_coarser(model, context.world.gravity, context.substep, context.substeps, context.dt, state, work.levels);
+    region_forces(model.rest, state.positions, state.velocities, state.region, work.elements);
+    for (const int v : state.region.free) state.forces[v] = work.elements.forces[v].head<3>().cast<double>();
+    add_band_forces(model, context.dt, state);
+  }
   accelerate(model, context.world.gravity, context.dt, state.forces, state);
   stop_at_instrument(work.points, model.rest.inverse_mass, state.positions, context.dt, state.velocities);
-  const double speed = advance(model, context.dt, state);
+  const double speed = std::max(coarser_speed, advance(model, context.dt, state));
+  if (!model.levels.empty()) {
+    press_coarser(model, work.points, state);
+    follow_coarser(model, context.dt, state);
+  }
   state.stiffening = stiffening(model.rest, model.tetrahedra_at, work.points, state.positions);
   return speed;
 }
@@ -156,6 +169,15 @@ double integrate_elements(StepContext& context) {
 void note_motion(StepContext& context, double way) {
   context.work().travel += way;
   for (Clearance& clearance : context.state.clearances) clearance.shift += way;
+}
+
+bool all_awake(const std::vector<ContactPoint>& points, const OrganState& state) {
+  for (const ContactPoint& point : points) {
+    for (int i = 0; i < point.bearers.count; ++i) {
+      if (state.region.mark[point.bearers.vertices[i]] != Part::free) return false;
+    }
+  }
+  return true;
 }
 
 }  // namespace
@@ -186,6 +208,7 @@ Workspace build_workspace(const World& world) {
       work.force_of.assign(count_memories(world, rest), 0.0);
     } else {
       prepare(work.elements, rest);
+      prepare(work.levels, model);
     }
     work.contact_of.assign(places, 0);
     work.points.reserve(usual_contacts);
@@ -244,7 +267,8 @@ int count_substeps(StepContext& context) {
   const bool one_is_enough = model.integrator == Integrator::vertex_block_descent || (context.state.asleep && !near);
   const int for_elements =
       one_is_enough ? 1 : substeps_for(model.rest, context.motion.duration, context.state.stiffening);
-  const int substeps = std::max({1, for_motion, for_elements});
+  int substeps = std::max({1, for_motion, for_elements});
+  if (!model.levels.empty()) share_substeps(model, context.motion.duration, context.state, substeps);
   context.dt = context.motion.duration / substeps;
   context.report.substeps = std::max(context.report.substeps, substeps);
   return substeps;
@@ -252,6 +276,8 @@ int count_substeps(StepContext& context) {
 
 void place_instruments(StepContext& context, int substep, int substeps) {
   const double fraction = static_cast<double>(substep) / substeps;
+  context.substep = substep;
+  context.substeps = substeps;
   Workspace& workspace = context.workspace;
   workspace.before = workspace.now;
   for (std::size_t i = 0; i < workspace.now.size(); ++i) {
@@ -276,6 +302,9 @@ void refit(StepContext& context) {
     const Box box = scene_bounds(piece.surface.bounds, context.workspace.now[piece.instrument]).grown(contact_margin);
     work.near[p] = placed && box.overlaps(work.tree.bounds().grown(work.travel)) ? 1 : 0;
     any_near = any_near || work.near[p] != 0;
+  }
+  if (any_near && !context.model().levels.empty()) {
+    for (int v = 0; v < context.model().rest.surface_vertices; ++v) place(context.model(), v, context.state);
   }
   if (any_near && work.travel > work.slack) fit_tree(context.model(), context.state, work);
 }
@@ -343,9 +372,15 @@ void respond(StepContext& context) {
     add_edge_contacts(surface, piece.surface, index, pose, work.detections[p], work.points);
     add_poke_contacts(surface, piece.surface, index, pose, poking, context.state.clearances[p], work.points);
   }
+  const bool levels = !context.model().levels.empty();
+  if (levels && !context.state.asleep && context.substep == 1)
+    note_motion(context, wake(context.model(), work.points, context.state, work.levels));
   if (work.points.empty()) return;
 
   if (!rest.embedding.corners.empty()) bear_by(rest.embedding, rest.triangles, work.points);
+  if (levels && (context.state.asleep || !all_awake(work.points, context.state))) {
+    note_motion(context, wake(context.model(), work.points, context.state, work.levels));
+  }
   context.state.asleep = context.state.asleep && !rest.elastic();
   for (ContactPoint& point : work.points) {
     const int instrument = context.world.pieces[point.piece].instrument;

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <cstring>
 
+#include "tissue_sim/simulation/levels.h"
+
 namespace tissue_sim {
 
 namespace {
@@ -37,6 +39,7 @@ OrganState rest_state(const World& world, int organ) {
   }
   state.touching.resize(world.pieces.size());
   for (const InstrumentPiece& piece : world.pieces) state.clearances.emplace_back(piece.surface.vertices.size());
+  if (!model.levels.empty()) rest_levels(model, world.pieces.size(), state);
   state.asleep = world.gravity.isZero();
   return state;
 }

@@ -60,6 +60,18 @@ void choose_integrator(const Scene& scene, const Organ& organ, OrganModel& model
   model.integrator_reason = reason.str();
 }
 
+void add_levels(const Organ& organ, OrganModel& model) {
+  model.levels = build_levels(organ, model.rest);
+  model.fine_edge = median_edge(model.rest);
+  model.shear_modulus = lame_moduli(organ.material.young, organ.material.poisson).mu;
+  const RegionSize size = region_size(*organ.levels_tolerance);
+  for (std::size_t level = 0; level < model.levels.size(); ++level) {
+    const RestShape& shape = level == 0 ? model.rest : model.levels[level - 1].shape;
+    const double edge = level == 0 ? model.fine_edge : model.levels[level - 1].edge;
+    model.regions.push_back(build_region_model(shape, size.edges * edge, edge));
+  }
+}
+
 }  // namespace
 
 World build_world(const Scene& scene) {
@@ -100,6 +112,7 @@ World build_world(const Scene& scene) {
         model.tetrahedra_at = corners_of(model.rest.tetrahedra, model.rest.positions.size());
         for (int& corner : model.tetrahedra_at.items) corner /= 4;
       }
+      if (organ.levels_tolerance && organ.model == Model::fem) add_levels(organ, model);
     }
     world.organs.push_back(std::move(model));
   }

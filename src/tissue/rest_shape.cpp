@@ -15,11 +15,6 @@ namespace {
 /// Of the organ's mass: what the mass floor may add. On a liver-like surface 0.26 % took 108 substeps to 11.
 constexpr double mass_floor = 0.005;
 
-/// Of the substep that is stable at rest: a stretched surface is stiffer, and contact confines it. 0.9 was seen to go
-/// unstable in a solid that contact confines.
-constexpr double surface_safety = 0.4;
-constexpr double solid_safety = 0.7;
-
 std::vector<int> find_component_roots(const MeshTopology& topology, int vertex_count) {
   std::vector<int> roots;
   std::vector<char> seen(static_cast<std::size_t>(vertex_count), 0);

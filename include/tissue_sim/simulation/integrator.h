@@ -26,6 +26,10 @@ void prepare(ElementRoom& room, const RestShape& rest);
 /// Writes the forces (N) of all elements, damping included, on all vertices.
 void element_forces(const RestShape& rest, const OrganState& state, std::vector<Vector3>& forces, ElementRoom& room);
 
+/// Writes into `room` the forces (N) of the awake batches of tetrahedra on the free vertices of a region.
+void region_forces(const RestShape& rest, const std::vector<Vector3>& positions, const std::vector<Vector3>& velocities,
+                   const ActiveRegion& region, ElementRoom& room);
+
 /// The first half of an explicit (symplectic) substep of dt (s): v += dt (f/m + g), slowed by the drag. Attached and
 /// held vertices stay.
 void accelerate(const OrganModel& organ, const Vector3& gravity, double dt, const std::vector<Vector3>& forces,

@@ -12,7 +12,9 @@ struct StepContext {
   OrganState& state;
   Workspace& workspace;
   StepReport& report;
-  double dt = 0.0;     ///< s, of the substep
+  double dt = 0.0;  ///< s, of the substep
+  int substep = 1;  ///< the first is 1
+  int substeps = 1;
   bool slept = false;  ///< the organ was asleep when the step began
 
   const OrganModel& model() const { return world.organs[organ]; }

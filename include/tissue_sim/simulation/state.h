@@ -15,19 +15,33 @@ struct PlaceForce {
   double force = 0.0;
 };
 
+/// What a step changes of a coarser level.
+struct LevelState {
+  std::vector<Vector3> positions;   ///< m
+  std::vector<Vector3> velocities;  ///< m/s
+  std::vector<Vector3> push;        ///< N s, of the contacts since the level's last substep
+  ActiveRegion region;
+  int substeps = 1;    ///< in this step
+  double ahead = 0.0;  ///< s, of the substep that the organ's own tetrahedra are in
+};
+
 /// What a step changes of one organ, and all that the next step reads of it.
 struct OrganState {
-  std::vector<Vector3> positions;            ///< m, scene frame, in the order of the rest shape's
-  std::vector<Vector3> velocities;           ///< m/s
-  std::vector<Vector3> forces;               ///< N, of the elements in the last substep
-  std::vector<double> depths;                ///< m, one a surface vertex, 0 where no instrument presses
-  std::vector<char> held;                    ///< 1: moved by an instrument and left there; empty with restoration
-  std::vector<std::vector<char>> colliding;  ///< per piece, one a vertex: the paper's memory; empty for the flood
-  std::vector<std::vector<int>> touching;    ///< per piece: vertices that were in contact in the last substep
-  std::vector<Clearance> clearances;         ///< per piece
-  std::vector<PlaceForce> pressing;          ///< vertex block descent starts from them
-  double stiffening = 0.0;                   ///< of an explicit solid in the last substep; see stiffening()
-  bool asleep = true;                        ///< at rest and untouched: nothing to integrate
+  std::vector<Vector3> positions;             ///< m, scene frame, in the order of the rest shape's
+  std::vector<Vector3> velocities;            ///< m/s
+  std::vector<Vector3> forces;                ///< N, of the elements in the last substep
+  std::vector<double> depths;                 ///< m, one a surface vertex, 0 where no instrument presses
+  std::vector<char> held;                     ///< 1: moved by an instrument and left there; empty with restoration
+  std::vector<std::vector<char>> colliding;   ///< per piece, one a vertex: the paper's memory; empty for the flood
+  std::vector<std::vector<int>> touching;     ///< per piece: vertices that were in contact in the last substep
+  std::vector<Clearance> clearances;          ///< per piece
+  std::vector<PlaceForce> pressing;           ///< vertex block descent starts from them
+  double stiffening = 0.0;                    ///< of an explicit solid in the last substep; see stiffening()
+  ActiveRegion region;                        ///< of the organ's own tetrahedra, with levels
+  std::vector<LevelState> levels;             ///< the coarser ones, the finest first
+  std::vector<std::vector<Vector3>> centres;  ///< per piece: m, rest places of what it touches or has just touched
+  std::vector<double> untouched;              ///< per piece: s since it touched
+  bool asleep = true;                         ///< at rest and untouched: nothing to integrate
 
   bool holds(std::size_t vertex) const { return !held.empty() && held[vertex] != 0; }
 };

@@ -4,6 +4,7 @@
 
 #include "tissue_sim/contact/contact_point.h"
 #include "tissue_sim/simulation/integrator.h"
+#include "tissue_sim/simulation/levels.h"
 #include "tissue_sim/simulation/state.h"
 #include "tissue_sim/simulation/step_report.h"
 #include "tissue_sim/simulation/vertex_block_descent.h"
@@ -36,6 +37,7 @@ struct OrganWorkspace {
   std::vector<char> near;                 ///< per piece: its box and the organ's overlap in this substep
   std::vector<ContactPoint> points;
   ElementRoom elements;
+  LevelsRoom levels;
   std::vector<Vector3> accelerations;
   std::vector<double> force_of;  ///< N, per place; 0 between two uses
   DescentRoom descent;

@@ -4,6 +4,11 @@
 
 namespace tissue_sim {
 
+/// Of the substep that is stable at rest: a stretched surface is stiffer, and contact confines it. 0.9 was seen to go
+/// unstable in a solid that contact confines.
+constexpr double surface_safety = 0.4;
+constexpr double solid_safety = 0.7;
+
 /// Raises the mass of the few vertices that would force tiny substeps, by at most `fraction` of the organ's mass in
 /// all. Vertex i can vibrate no faster than omega_i^2 = (sum over its elements of k |grad_i C| sum_j |grad_j C|) / m_i
 /// (Gershgorin); the lowest common bound on omega_i that the fraction pays for is found and met.

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "tissue_sim/geometry/embedding.h"
+#include "tissue_sim/geometry/tetrahedral_mesh.h"
+
+namespace tissue_sim {
+
+/// Equal cubes over a solid, each cut into six tetrahedra around a diagonal (Kuhn), neighbours mirrored so that they
+/// fit together and no direction is preferred. Only tetrahedra that hold something of the solid are there.
+struct Lattice {
+  TetrahedralMesh mesh;
+  /// Per tetrahedron, the part of its volume that the solid fills, 0 to 1.
+  std::vector<double> fill;
+  Vector3 origin = Vector3::Zero();
+  double edge = 0.0;            ///< m, of the cubes
+  std::array<int, 3> cells{};   ///< cubes along x, y, z
+  std::vector<int> tetrahedra;  ///< six a cube, into `mesh`, or -1; cube (i, j, k) is i + cells[0] (j + cells[1] k)
+};
+
+/// The lattice of cubes of `edge` (m) over a solid. Tetrahedra that hold one of the solid's vertices or of `points` are
+/// there even where the solid fills next to nothing of them. Needs a solid of positive volumes.
+Lattice cover(const TetrahedralMesh& solid, const std::vector<Vector3>& points, double edge);
+
+/// Each point by the tetrahedron of the lattice that holds it: those given to cover() all have one. Throws
+/// std::invalid_argument for a point that has none.
+Embedding embed(const std::vector<Vector3>& points, const Lattice& lattice);
+
+}  // namespace tissue_sim

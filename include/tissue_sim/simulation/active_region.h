@@ -1,0 +1,49 @@
+#pragma once
+
+#include <vector>
+
+#include "tissue_sim/geometry/aabb_tree.h"
+#include "tissue_sim/tissue/level.h"
+
+namespace tissue_sim {
+
+/// What a level needs to wake only a part of it. Never changes.
+struct RegionModel {
+  AabbTree batches;     ///< of the batches of tetrahedra, at rest
+  FlatLists vertices;   ///< of each batch, every one once
+  double radius = 0.0;  ///< m, around what touches an instrument
+  double band = 0.0;    ///< m, inside the radius: where the coarser level takes over
+};
+
+RegionModel build_region_model(const RestShape& shape, double radius, double edge);
+
+/// What a vertex has to do with a region.
+enum class Part : char { asleep, driven, free };
+
+/// The part of a level that is simulated now; the rest follows the next coarser level.
+struct ActiveRegion {
+  std::vector<int> batches;     ///< of tetrahedra: those with a free vertex
+  std::vector<int> free;        ///< vertices that are integrated
+  std::vector<int> driven;      ///< the other vertices of the batches: they follow the coarser level
+  std::vector<int> band;        ///< into `free`: those that a spring pulls towards the coarser level
+  std::vector<double> reach;    ///< per entry of `band`: 0 where it begins, 1 at the radius
+  std::vector<Vector3> target;  ///< m, per entry of `band`: where the coarser level would have it
+  std::vector<Part> mark;       ///< per vertex
+};
+
+/// Room for recentre(), one entry a vertex or batch.
+struct RegionRoom {
+  std::vector<std::uint64_t> vertex_stamp;
+  std::vector<std::uint64_t> batch_stamp;
+  std::vector<double> distance;
+  std::vector<int> woken;   ///< vertices that were asleep before
+  std::vector<int> fallen;  ///< vertices that were free before and are not any more
+  std::uint64_t stamp = 0;
+};
+void prepare(RegionRoom& room, const RestShape& shape);
+
+/// Around the centres, a list a piece (rest places, m): free is what lies within the radius of one of them at rest.
+void recentre(const RegionModel& model, const RestShape& shape, const std::vector<std::vector<Vector3>>& centres,
+              ActiveRegion& region, RegionRoom& room);
+
+}  // namespace tissue_sim

@@ -1,0 +1,45 @@
+#pragma once
+
+#include "tissue_sim/contact/contact_point.h"
+#include "tissue_sim/simulation/integrator.h"
+#include "tissue_sim/simulation/state.h"
+
+namespace tissue_sim {
+
+/// Room for the levels of one organ, one entry a level: the first is the organ's own tetrahedra.
+struct LevelsRoom {
+  std::vector<ElementRoom> elements;  ///< of the coarser levels only
+  std::vector<RegionRoom> regions;
+  std::vector<char> touching;  ///< per piece
+};
+void prepare(LevelsRoom& room, const OrganModel& model);
+
+/// Everything asleep, at rest.
+void rest_levels(const OrganModel& model, std::size_t pieces, OrganState& state);
+
+/// Wakes what is near the contact points and lets the rest of the finer levels fall asleep. Returns the farthest way
+/// (m) of a vertex that fell asleep.
+double wake(const OrganModel& model, const std::vector<ContactPoint>& points, OrganState& state, LevelsRoom& room);
+
+/// Substeps of every coarser level in a step of `duration`; each divides that of the level before. Raises `substeps`,
+/// those of the organ's own tetrahedra, to a multiple.
+void share_substeps(const OrganModel& model, double duration, OrganState& state, int& substeps);
+
+/// Moves the coarser levels whose substep begins with substep `substep` (1 is the first) of the organ's own
+/// tetrahedra, which takes dt (s). Returns the largest speed, m/s.
+double move_coarser(const OrganModel& model, const Vector3& gravity, int substep, int substeps, double dt,
+                    OrganState& state, LevelsRoom& room);
+
+/// Adds to the forces of the organ's own free vertices the springs towards the coarser level.
+void add_band_forces(const OrganModel& model, double dt, OrganState& state);
+
+/// What follows the coarser level goes where that has it at the end of the substep.
+void follow_coarser(const OrganModel& model, double dt, OrganState& state);
+
+/// Hands the impulses of the contact points to the coarser levels.
+void press_coarser(const OrganModel& model, const std::vector<ContactPoint>& points, OrganState& state);
+
+/// Where the levels have a vertex of the organ that is asleep. Vertices that are awake stay.
+void place(const OrganModel& model, int vertex, OrganState& state);
+
+}  // namespace tissue_sim

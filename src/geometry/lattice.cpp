@@ -1,0 +1,206 @@
+#include "tissue_sim/geometry/lattice.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace tissue_sim {
+
+namespace {
+
+/// Samples across the edge of a cube, at least: what a tetrahedron holds is counted by points of equal volume.
+constexpr double samples_across = 6.0;
+
+/// The samples of a full tetrahedron come to within a tenth of its volume.
+constexpr double counted_full = 0.9;
+
+/// Three coordinates of the unit cube in descending order, and which axes they belong to: that order is the path along
+/// the cube's edges from its first corner to its last, and so its tetrahedron.
+struct Path {
+  std::array<int, 3> axes{{0, 1, 2}};
+  std::array<double, 4> weights{};  ///< of the four corners along the path
+
+  explicit Path(const Vector3& inside) {
+    std::stable_sort(axes.begin(), axes.end(), [&](int a, int b) { return inside[a] > inside[b]; });
+    const double first = inside[axes[0]];
+    const double second = inside[axes[1]];
+    const double third = inside[axes[2]];
+    weights = {1.0 - first, first - second, second - third, third};
+  }
+
+  /// 0 to 5, one an order of the axes.
+  int number() const { return 2 * axes[0] + (axes[1] > axes[2] ? 1 : 0); }
+};
+
+struct Grid {
+  Vector3 origin;
+  double edge;
+  std::array<int, 3> cells;
+
+  int cube(const std::array<int, 3>& at) const { return at[0] + cells[0] * (at[1] + cells[1] * at[2]); }
+  int corner(const std::array<int, 3>& at) const { return at[0] + (cells[0] + 1) * (at[1] + (cells[1] + 1) * at[2]); }
+  std::size_t cubes() const {
+    return static_cast<std::size_t>(cells[0]) * static_cast<std::size_t>(cells[1]) * static_cast<std::size_t>(cells[2]);
+  }
+  Vector3 place(const std::array<int, 3>& corner) const {
+    return origin + edge * Vector3(corner[0], corner[1], corner[2]);
+  }
+};
+
+/// Where in the grid a point is: its cube, and the tetrahedron of it by the path.
+struct Place {
+  std::array<int, 3> cube{};
+  Path path;
+
+  static Place of(const Vector3& p, const Grid& grid) {
+    const Vector3 scaled = (p - grid.origin) / grid.edge;
+    std::array<int, 3> cube{};
+    Vector3 inside;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto a = static_cast<std::size_t>(axis);
+      cube[a] = std::clamp(static_cast<int>(std::floor(scaled[axis])), 0, grid.cells[a] - 1);
+      const double along = scaled[axis] - cube[a];
+      inside[axis] = cube[a] % 2 == 0 ? along : 1.0 - along;  // mirrored
+    }
+    return {cube, Path(inside)};
+  }
+
+  std::size_t tetrahedron(const Grid& grid) const {
+    return 6 * static_cast<std::size_t>(grid.cube(cube)) + static_cast<std::size_t>(path.number());
+  }
+
+  /// Whether the corners along the path are left-handed, and the last two change places.
+  bool swapped() const {
+    const int mirrored = cube[0] + cube[1] + cube[2];
+    const bool odd_path = path.axes[1] != (path.axes[0] + 1) % 3;
+    return (mirrored % 2 != 0) != odd_path;
+  }
+
+  /// The grid points along the path.
+  std::array<std::array<int, 3>, 4> corners() const {
+    std::array<std::array<int, 3>, 4> along;
+    std::array<int, 3> at = cube;
+    for (std::size_t axis = 0; axis < 3; ++axis) at[axis] += cube[axis] % 2;
+    along[0] = at;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto axis = static_cast<std::size_t>(path.axes[i]);
+      at[axis] += cube[axis] % 2 == 0 ? 1 : -1;
+      along[i + 1] = at;
+    }
+    return along;
+  }
+};
+
+double longest_edge(const TetrahedralMesh& solid, const Tetrahedron& t) {
+  double longest = 0.0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    for (std::size_t j = i + 1; j < 4; ++j) {
+      longest = std::max(longest, (solid.vertices[t[j]] - solid.vertices[t[i]]).squaredNorm());
+    }
+  }
+  return std::sqrt(longest);
+}
+
+/// Calls visit(point) for points that share the tetrahedron's volume evenly: those of a cube, folded into one of its
+/// six tetrahedra.
+template <class Visit>
+int sample(const TetrahedralMesh& solid, const Tetrahedron& t, double spacing, Visit&& visit) {
+  const int across = std::max(1, static_cast<int>(std::ceil(longest_edge(solid, t) / spacing)));
+  for (int i = 0; i < across; ++i) {
+    for (int j = 0; j < across; ++j) {
+      for (int k = 0; k < across; ++k) {
+        const Path folded(Vector3(i + 1.0 / 6.0, j + 3.0 / 6.0, k + 5.0 / 6.0) / across);  // no ties
+        Vector3 point = Vector3::Zero();
+        for (std::size_t corner = 0; corner < 4; ++corner) {
+          point += folded.weights[corner] * solid.vertices[t[corner]];
+        }
+        visit(point);
+      }
+    }
+  }
+  return across * across * across;
+}
+
+Grid grid_around(const std::vector<Vector3>& vertices, const std::vector<Vector3>& points, double edge) {
+  Vector3 lower = vertices.front();
+  Vector3 upper = lower;
+  for (const std::vector<Vector3>* list : {&vertices, &points}) {
+    for (const Vector3& p : *list) {
+      lower = lower.cwiseMin(p);
+      upper = upper.cwiseMax(p);
+    }
+  }
+  Grid grid{lower, edge, {}};
+  for (int axis = 0; axis < 3; ++axis) {
+    const double size = upper[axis] - lower[axis];
+    const int cells = std::max(1, static_cast<int>(std::ceil(size / edge - 1e-9)));
+    grid.cells[static_cast<std::size_t>(axis)] = cells;
+    grid.origin[axis] -= 0.5 * (cells * edge - size);
+  }
+  return grid;
+}
+
+}  // namespace
+
+Lattice cover(const TetrahedralMesh& solid, const std::vector<Vector3>& points, double edge) {
+  const Grid grid = grid_around(solid.vertices, points, edge);
+  Lattice lattice;
+  lattice.origin = grid.origin;
+  lattice.edge = edge;
+  lattice.cells = grid.cells;
+  lattice.tetrahedra.assign(6 * grid.cubes(), -1);
+  std::vector<int> node_of;
+  node_of.assign(static_cast<std::size_t>(grid.corner({grid.cells[0], grid.cells[1], grid.cells[2]})) + 1, -1);
+
+  const auto tetrahedron_at = [&](const Vector3& p) {
+    const Place place = Place::of(p, grid);
+    int& number = lattice.tetrahedra[place.tetrahedron(grid)];
+    if (number >= 0) return number;
+    number = static_cast<int>(lattice.mesh.tetrahedra.size());
+    Tetrahedron corners{};
+    const auto along = place.corners();
+    for (std::size_t i = 0; i < 4; ++i) {
+      int& node = node_of[static_cast<std::size_t>(grid.corner(along[i]))];
+      if (node < 0) {
+        node = static_cast<int>(lattice.mesh.vertices.size());
+        lattice.mesh.vertices.push_back(grid.place(along[i]));
+      }
+      corners[i] = node;
+    }
+    if (place.swapped()) std::swap(corners[2], corners[3]);
+    lattice.mesh.tetrahedra.push_back(corners);
+    lattice.fill.push_back(0.0);
+    return number;
+  };
+  const double whole = edge * edge * edge / 6.0;
+  std::vector<int> held;
+  for (const Tetrahedron& t : solid.tetrahedra) {
+    held.clear();
+    const int samples =
+        sample(solid, t, edge / samples_across, [&](const Vector3& p) { held.push_back(tetrahedron_at(p)); });
+    const double share = tetrahedron_volume(solid, t) / (whole * samples);
+    for (const int number : held) lattice.fill[number] += share;
+  }
+  for (double& fill : lattice.fill) fill = fill > counted_full ? 1.0 : fill;
+  for (const Vector3& p : solid.vertices) tetrahedron_at(p);
+  for (const Vector3& p : points) tetrahedron_at(p);
+  return lattice;
+}
+
+Embedding embed(const std::vector<Vector3>& points, const Lattice& lattice) {
+  const Grid grid{lattice.origin, lattice.edge, lattice.cells};
+  Embedding embedding;
+  embedding.corners.reserve(points.size());
+  embedding.weights.reserve(points.size());
+  for (const Vector3& p : points) {
+    const Place place = Place::of(p, grid);
+    const int number = lattice.tetrahedra[place.tetrahedron(grid)];
+    if (number < 0) throw std::invalid_argument("embed: a point lies in no tetrahedron of the lattice");
+    embedding.corners.push_back(lattice.mesh.tetrahedra[number]);
+    embedding.weights.push_back(place.path.weights);
+    if (place.swapped()) std::swap(embedding.weights.back()[2], embedding.weights.back()[3]);
+  }
+  return embedding;
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,282 @@
+#include "tissue_sim/simulation/levels.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tissue_sim {
+
+namespace {
+
+/// s. What no instrument touches any more stays awake for this long.
+constexpr double awake_after_contact = 0.3;
+
+/// Of an edge: contact points closer than this to a centre need none of their own.
+constexpr double centre_spacing = 0.5;
+
+/// Of the way: what a pin that has strayed comes back in one substep.
+constexpr double pin_return = 0.2;
+
+/// The arrays of one level of an organ, the organ's own tetrahedra being level 0.
+struct LevelView {
+  const RestShape& shape;
+  std::vector<Vector3>& positions;
+  std::vector<Vector3>& velocities;
+  ActiveRegion& region;
+};
+
+const RestShape& shape_of(const OrganModel& model, std::size_t level) {
+  return level == 0 ? model.rest : model.levels[level - 1].shape;
+}
+
+LevelView view(const OrganModel& model, std::size_t level, OrganState& state) {
+  if (level == 0) return {model.rest, state.positions, state.velocities, state.region};
+  LevelState& of_level = state.levels[level - 1];
+  return {model.levels[level - 1].shape, of_level.positions, of_level.velocities, of_level.region};
+}
+
+/// How far a vertex is from its rest place, and how fast.
+struct Moved {
+  Vector3 displacement = Vector3::Zero();
+  Vector3 velocity = Vector3::Zero();
+};
+
+/// By the level itself where the vertex is awake, else by the levels above it. A coarser level may be ahead of the
+/// substep that the finer ones are in: it moves in a line between two of its substeps.
+Moved moved(const OrganModel& model, std::size_t level, int v, const OrganState& state);
+
+Moved by_coarser(const OrganModel& model, std::size_t level, int v, const OrganState& state) {
+  const Embedding& embedding = model.levels[level].finer;
+  Moved sum;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double weight = embedding.weights[v][i];
+    const Moved corner = moved(model, level + 1, embedding.corners[v][i], state);
+    sum.displacement += weight * corner.displacement;
+    sum.velocity += weight * corner.velocity;
+  }
+  return sum;
+}
+
+Moved moved(const OrganModel& model, std::size_t level, int v, const OrganState& state) {
+  if (level == 0) return by_coarser(model, level, v, state);
+  const LevelState& of_level = state.levels[level - 1];
+  if (of_level.region.mark[v] == Part::asleep) return by_coarser(model, level, v, state);
+  const Vector3& velocity = of_level.velocities[v];
+  return {of_level.positions[v] - of_level.ahead * velocity - shape_of(model, level).positions[v], velocity};
+}
+
+/// The driven vertices go where the coarser level has them, and the band's targets with them.
+void follow(const OrganModel& model, std::size_t level, OrganState& state) {
+  const LevelView at = view(model, level, state);
+  for (const int v : at.region.driven) {
+    const Moved to = by_coarser(model, level, v, state);
+    at.positions[v] = at.shape.positions[v] + to.displacement;
+    at.velocities[v] = to.velocity;
+  }
+  for (std::size_t i = 0; i < at.region.band.size(); ++i) {
+    const int v = at.region.free[at.region.band[i]];
+    at.region.target[i] = at.shape.positions[v] + by_coarser(model, level, v, state).displacement;
+  }
+}
+
+/// N/m of a band's spring: 0 where the band begins, and what fixes the vertex at the radius. No stiffer than a substep
+/// of dt (s) is stable for.
+double band_stiffness(double reach, double mass, double modulus_times_edge, double dt) {
+  return std::min(3.0 * modulus_times_edge * reach * reach / (1.01 - std::min(reach, 1.0)), 0.25 * mass / (dt * dt));
+}
+
+void wake_level(const OrganModel& model, std::size_t level, const std::vector<ContactPoint>& points, OrganState& state,
+                RegionRoom& room, double& farthest) {
+  const LevelView at = view(model, level, state);
+  recentre(model.regions[level], at.shape, state.centres, at.region, room);
+  for (const int v : room.fallen) {
+    const Moved to = by_coarser(model, level, v, state);
+    const Vector3 place = at.shape.positions[v] + to.displacement;
+    farthest = std::max(farthest, (place - at.positions[v]).norm());
+    at.positions[v] = place;
+    at.velocities[v].setZero();
+  }
+  for (const int v : room.woken) {
+    const Moved to = by_coarser(model, level, v, state);
+    at.positions[v] = at.shape.positions[v] + to.displacement;
+    at.velocities[v] = to.velocity;
+  }
+  static_cast<void>(points);
+  follow(model, level, state);
+}
+
+double edge_of(const OrganModel& model, std::size_t level) {
+  return level == 0 ? model.fine_edge : model.levels[level - 1].edge;
+}
+
+/// Gives the nodes around every pin the velocities at which it stays, or comes back, to its rest place.
+void hold_pins(const Level& level, double dt, const LevelView& at) {
+  for (std::size_t p = 0; p < level.pins.corners.size(); ++p) {
+    const Tetrahedron& corners = level.pins.corners[p];
+    const std::array<double, 4>& weights = level.pins.weights[p];
+    Vector3 velocity = Vector3::Zero();
+    double ease = 0.0;
+    bool awake = false;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const int v = corners[i];
+      if (at.region.mark[v] == Part::asleep) continue;
+      awake = true;
+      velocity += weights[i] * (at.velocities[v] + pin_return / dt * (at.positions[v] - at.shape.positions[v]));
+      ease += weights[i] * weights[i] * at.shape.inverse_mass[v];
+    }
+    if (!awake) continue;
+    for (std::size_t i = 0; i < 4; ++i) {
+      at.velocities[corners[i]] -= weights[i] * at.shape.inverse_mass[corners[i]] / ease * velocity;
+    }
+  }
+}
+
+/// One explicit substep of a coarser level: elements, what the contacts pushed, band.
+double move_level(const OrganModel& model, std::size_t level, const Vector3& gravity, double dt, OrganState& state,
+                  ElementRoom& room) {
+  const LevelView at = view(model, level, state);
+  LevelState& own = state.levels[level - 1];
+  region_forces(at.shape, at.positions, at.velocities, at.region, room);
+  const double slowed = 1.0 / (1.0 + dt * model.drag);
+  double fastest = 0.0;
+  const double stiffness = 1.0 * model.shear_modulus * edge_of(model, level);
+  for (std::size_t i = 0; i < at.region.band.size(); ++i) {
+    const int v = at.region.free[at.region.band[i]];
+    const double k = band_stiffness(at.region.reach[i], at.shape.mass[v], stiffness, dt);
+    own.push[v] += dt * k * (at.region.target[i] - at.positions[v]);
+  }
+  for (const int v : at.region.free) {
+    const Vector3 force = room.forces[v].head<3>().cast<double>();
+    at.velocities[v] =
+        slowed * (at.velocities[v] + at.shape.inverse_mass[v] * (dt * force + own.push[v]) + dt * gravity);
+    own.push[v].setZero();
+  }
+  hold_pins(model.levels[level - 1], dt, at);
+  for (const int v : at.region.free) {
+    at.positions[v] += dt * at.velocities[v];
+    fastest = std::max(fastest, at.velocities[v].squaredNorm());
+  }
+  return std::sqrt(fastest);
+}
+
+}  // namespace
+
+void prepare(LevelsRoom& room, const OrganModel& model) {
+  room.elements.resize(model.levels.size());
+  room.regions.resize(model.levels.size());
+  for (std::size_t level = 0; level < model.levels.size(); ++level) {
+    prepare(room.elements[level], model.levels[level].shape);
+    prepare(room.regions[level], shape_of(model, level));
+  }
+}
+
+void rest_levels(const OrganModel& model, std::size_t pieces, OrganState& state) {
+  state.centres.assign(pieces, {});
+  state.untouched.assign(pieces, 0.0);
+  state.region.mark.assign(model.rest.positions.size(), Part::asleep);
+  for (const Level& level : model.levels) {
+    LevelState& at = state.levels.emplace_back();
+    at.positions = level.shape.positions;
+    at.velocities.assign(at.positions.size(), Vector3::Zero());
+    at.push = at.velocities;
+    at.region.mark.assign(at.positions.size(), Part::asleep);
+  }
+  // The coarsest is always awake.
+  ActiveRegion& coarsest = state.levels.back().region;
+  std::fill(coarsest.mark.begin(), coarsest.mark.end(), Part::free);
+  for (std::size_t v = 0; v < coarsest.mark.size(); ++v) coarsest.free.push_back(static_cast<int>(v));
+  for (std::size_t b = 0; b < model.levels.back().shape.packed.batches.size(); ++b) {
+    coarsest.batches.push_back(static_cast<int>(b));
+  }
+}
+
+double wake(const OrganModel& model, const std::vector<ContactPoint>& points, OrganState& state, LevelsRoom& room) {
+  const double spacing = centre_spacing * model.fine_edge;
+  std::vector<char>& seen = room.touching;
+  seen.assign(state.centres.size(), 0);
+  for (const ContactPoint& point : points) {
+    std::vector<Vector3>& centres = state.centres[point.piece];
+    if (!seen[point.piece]) centres.clear();
+    seen[point.piece] = 1;
+    state.untouched[point.piece] = 0.0;
+    const Vector3 place = at_point(point, model.rest.positions);
+    bool covered = false;
+    for (const Vector3& centre : centres) covered = covered || (centre - place).squaredNorm() < spacing * spacing;
+    if (!covered) centres.push_back(place);
+  }
+  for (std::size_t p = 0; p < seen.size(); ++p) {
+    if (!seen[p] && state.untouched[p] > awake_after_contact) state.centres[p].clear();
+  }
+  double farthest = 0.0;
+  for (std::size_t level = model.levels.size(); level-- > 0;) {
+    wake_level(model, level, points, state, room.regions[level], farthest);
+  }
+  return farthest;
+}
+
+void share_substeps(const OrganModel& model, double duration, OrganState& state, int& substeps) {
+  int coarser = 1;
+  for (std::size_t level = model.levels.size(); level-- > 0;) {
+    const int needed = substeps_for(model.levels[level].shape, duration);
+    coarser *= (needed + coarser - 1) / coarser;
+    state.levels[level].substeps = coarser;
+  }
+  substeps = coarser * ((substeps + coarser - 1) / coarser);
+}
+
+double move_coarser(const OrganModel& model, const Vector3& gravity, int substep, int substeps, double dt,
+                    OrganState& state, LevelsRoom& room) {
+  double fastest = 0.0;
+  for (std::size_t level = model.levels.size(); level > 0; --level) {
+    LevelState& at = state.levels[level - 1];
+    const int every = substeps / at.substeps;
+    if ((substep - 1) % every != 0) continue;
+    fastest = std::max(fastest, move_level(model, level, gravity, every * dt, state, room.elements[level - 1]));
+    at.ahead = every * dt;
+    if (level == model.levels.size()) continue;
+    // The coarser level as it will be at the end of this one's substep.
+    LevelState& coarser = state.levels[level];
+    coarser.ahead -= every * dt;
+    follow(model, level, state);
+    coarser.ahead += every * dt;
+  }
+  for (std::size_t p = 0; p < state.untouched.size(); ++p) state.untouched[p] += dt;
+  return fastest;
+}
+
+void add_band_forces(const OrganModel& model, double dt, OrganState& state) {
+  const ActiveRegion& region = state.region;
+  const double stiffness = model.shear_modulus * model.fine_edge;
+  for (std::size_t i = 0; i < region.band.size(); ++i) {
+    const int v = region.free[region.band[i]];
+    const double k = band_stiffness(region.reach[i], model.rest.mass[v], stiffness, dt);
+    state.forces[v] += k * (region.target[i] - state.positions[v]);
+  }
+}
+
+void follow_coarser(const OrganModel& model, double dt, OrganState& state) {
+  for (LevelState& level : state.levels) level.ahead = std::max(0.0, level.ahead - dt);
+  follow(model, 0, state);
+}
+
+void press_coarser(const OrganModel& model, const std::vector<ContactPoint>& points, OrganState& state) {
+  const auto press = [&](std::size_t level, int v, const Vector3& impulse, auto&& self) -> void {
+    if (level > 0) state.levels[level - 1].push[v] += impulse;
+    if (level == model.levels.size()) return;
+    const Embedding& bearing = model.levels[level].bearing;
+    for (std::size_t i = 0; i < 4; ++i) {
+      self(level + 1, bearing.corners[v][i], bearing.weights[v][i] * impulse, self);
+    }
+  };
+  for (const ContactPoint& point : points) {
+    for (int i = 0; i < point.bearers.count; ++i) {
+      press(0, point.bearers.vertices[i], point.bearers.weights[i] * point.impulse * point.direction, press);
+    }
+  }
+}
+
+void place(const OrganModel& model, int vertex, OrganState& state) {
+  if (state.region.mark[vertex] != Part::asleep) return;
+  state.positions[vertex] = model.rest.positions[vertex] + by_coarser(model, 0, vertex, state).displacement;
+}
+
+}  // namespace tissue_sim

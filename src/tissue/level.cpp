@@ -1,0 +1,137 @@
+#include "tissue_sim/tissue/level.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tissue_sim/geometry/lattice.h"
+#include "tissue_sim/tissue/stability.h"
+
+namespace tissue_sim {
+
+namespace {
+
+/// Of the organ's moduli: linear tetrahedra of a coarse lattice are too stiff by about this.
+constexpr double coarse_modulus = 0.9;
+
+/// A region that is more of the organ than this saves nothing.
+constexpr double largest_part = 0.3;
+
+/// What a tetrahedron of the lattice counts at least. With nothing in it the vertices on its far side would be free.
+constexpr double least_fill = 0.02;
+
+double half_ball(double radius) {
+  return 2.0 / 3.0 * 3.14159265358979 * radius * radius * radius;
+}
+
+double volume_of(const RestShape& shape) {
+  double volume = 0.0;
+  for (const NeoHookeanElement& element : shape.tetrahedra) volume += element.volume;
+  return volume;
+}
+
+/// The attached vertices of the finer level in one tetrahedron hold it at their middle. Its nodes may stand a good way
+/// off the tissue: held themselves, they would make a thin organ thicker and far softer.
+void add_pins(const RestShape& finer, Level& level) {
+  std::vector<int> held;
+  for (std::size_t v = 0; v < finer.positions.size(); ++v) {
+    if (finer.attached[v]) held.push_back(static_cast<int>(v));
+  }
+  const std::vector<Tetrahedron>& corners = level.finer.corners;
+  std::sort(held.begin(), held.end(),
+            [&](int a, int b) { return corners[a] < corners[b] || (corners[a] == corners[b] && a < b); });
+  double mass = 0.0;
+  for (std::size_t i = 0; i < held.size(); ++i) {
+    const int v = held[i];
+    if (i == 0 || corners[v] != level.pins.corners.back()) {
+      level.pins.corners.push_back(corners[v]);
+      level.pins.weights.push_back({});
+      mass = 0.0;
+    }
+    const double before = mass / (mass + finer.mass[v]);
+    mass += finer.mass[v];
+    std::array<double, 4>& weights = level.pins.weights.back();
+    for (std::size_t c = 0; c < 4; ++c) {
+      weights[c] = before * weights[c] + (1.0 - before) * level.finer.weights[v][c];
+    }
+  }
+}
+
+Level build_level(const Organ& organ, const RestShape& finer, double edge) {
+  const Lattice lattice = cover(organ.solid, finer.positions, edge);
+  Level level;
+  level.edge = edge;
+  level.finer = embed(finer.positions, lattice);
+  level.bearing = level.finer;
+  RestShape& shape = level.shape;
+  shape.positions = lattice.mesh.vertices;
+  shape.mass.assign(shape.positions.size(), 0.0);
+  shape.mean_edge = edge;
+  shape.size = finer.size;
+  LameModuli moduli = lame_moduli(organ.material.young, organ.material.poisson);
+  moduli.mu *= coarse_modulus;
+  moduli.lambda *= coarse_modulus;
+  for (std::size_t t = 0; t < lattice.mesh.tetrahedra.size(); ++t) {
+    const Tetrahedron& corners = lattice.mesh.tetrahedra[t];
+    const double fill = std::max(lattice.fill[t], least_fill);
+    std::array<Vector3, 4> x;
+    for (std::size_t i = 0; i < 4; ++i) x[i] = shape.positions[corners[i]];
+    const double mass = organ.material.density * fill * tetrahedron_volume(x[0], x[1], x[2], x[3]);
+    for (const int corner : corners) shape.mass[corner] += 0.25 * mass;
+    shape.tetrahedra.push_back(NeoHookeanElement::at_rest(corners, x, {fill * moduli.mu, fill * moduli.lambda}));
+  }
+  shape.attached.assign(shape.positions.size(), 0);
+  add_pins(finer, level);
+  for (std::size_t v = 0; v < level.bearing.weights.size(); ++v) {
+    std::array<double, 4>& weights = level.bearing.weights[v];
+    double sum = 0.0;
+    for (std::size_t i = 0; i < 4; ++i) sum += weights[i] *= shape.mass[level.bearing.corners[v][i]];
+    for (double& weight : weights) weight /= sum;
+  }
+  for (std::size_t v = 0; v < shape.mass.size(); ++v) {
+    shape.inverse_mass.push_back(shape.attached[v] ? 0.0 : 1.0 / shape.mass[v]);
+    shape.total_mass += shape.mass[v];
+  }
+  shape.fastest_frequency = fastest_frequency(shape);
+  shape.damping_time = 2.0 * organ.material.damping / shape.fastest_frequency;
+  shape.stable_substep = stable_substep(shape, solid_safety);
+  shape.stiffest_element = stiffest_element(shape, shape.positions);
+  shape.packed = pack(shape.tetrahedra);
+  return level;
+}
+
+}  // namespace
+
+RegionSize region_size(double tolerance) {
+  // A radius of 3 cells of the coarser level, each twice the edge of the finer, made errors of 1 to 3 % in the force, 3
+  // to 4 % near the contact and 10 to 12 % over a whole block bonded to the ground; 4 cells a third of that.
+  const double cells = 3.0 + (0.05 - tolerance) / 0.03;
+  return {2.0 * cells, cells};
+}
+
+double median_edge(const RestShape& shape) {
+  std::vector<double> edges;
+  for (const NeoHookeanElement& element : shape.tetrahedra) {
+    for (std::size_t i = 0; i < 4; ++i) {
+      for (std::size_t j = i + 1; j < 4; ++j) {
+        edges.push_back((shape.positions[element.vertices[j]] - shape.positions[element.vertices[i]]).norm());
+      }
+    }
+  }
+  const auto middle = edges.begin() + static_cast<std::ptrdiff_t>(edges.size() / 2);
+  std::nth_element(edges.begin(), middle, edges.end());
+  return *middle;
+}
+
+std::vector<Level> build_levels(const Organ& organ, const RestShape& finest) {
+  std::vector<Level> levels;
+  const RegionSize size = region_size(*organ.levels_tolerance);
+  const double volume = volume_of(finest);
+  double edge = median_edge(finest);
+  while (half_ball(size.edges * edge) < largest_part * volume) {
+    edge *= size.edges / size.cells;
+    levels.push_back(build_level(organ, levels.empty() ? finest : levels.back().shape, edge));
+  }
+  return levels;
+}
+
+}  // namespace tissue_sim
