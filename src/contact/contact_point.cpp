@@ -188,12 +188,13 @@ void add_poke_contacts(const OrganSurface& organ, const InstrumentSurface& instr
     if (travelled < clearance.free_until[u]) continue;
 
     const Vector3 tip = pose.apply(instrument.vertices[u]);
-    const ClosestOnMesh closest = closest_on_mesh(organ.positions, organ.triangles, organ.tree, tip,
-                                                  std::numeric_limits<double>::max(), clearance.nearest[u]);
+    const ClosestOnMesh closest =
+        closest_on_organ(organ, tip, std::numeric_limits<double>::max(), clearance.nearest[u]);
     if (closest.triangle < 0) continue;  // a position that is not a number is near nothing
     const double distance = std::sqrt(closest.squared_distance);
     clearance.nearest[u] = closest.triangle;
     clearance.free_until[u] = travelled + distance - poke_reach;
+    place_around(organ, closest.triangle);
     const Vector3 outward =
         pseudonormal(organ.positions, organ.triangles, organ.topology, closest.triangle, closest.on.feature);
     const Vector3 above = tip - closest.on.point;

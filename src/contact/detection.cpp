@@ -30,9 +30,10 @@ void set_side(Detection& d, int vertex, Side side) {
 void gather_candidates(const OrganSurface& organ, const InstrumentSurface& instrument, const Pose& pose, Detection& d) {
   d.candidate_edges.clear();
   d.candidates.clear();
-  organ.tree.for_each_near(scene_bounds(instrument.bounds, pose), [&](int triangle) {
-    for (const int edge : organ.topology.triangle_edges[triangle]) {
-      if (d.edge_stamp[edge] == d.stamp) continue;
+  for_each_patch_near(organ, scene_bounds(instrument.bounds, pose), [&](int patch) {
+    const FlatLists& edges = organ.patches.edges;
+    for (const int* e = edges.begin(patch); e != edges.end(patch); ++e) {
+      const int edge = *e;
       d.edge_stamp[edge] = d.stamp;
       d.crossed_edge_of[edge] = -1;
       d.candidate_edges.push_back(edge);
@@ -162,6 +163,7 @@ void prepare(Detection& d, const OrganSurface& organ) {
 
 const Vector3& local_position(Detection& d, const OrganSurface& organ, const Pose& pose, int vertex) {
   if (d.local_stamp[vertex] != d.stamp) {
+    place_vertex(organ, vertex);
     d.local_stamp[vertex] = d.stamp;
     d.local[vertex] = pose.apply_inverse(organ.positions[vertex]) + tie_break;
   }

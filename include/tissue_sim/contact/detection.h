@@ -1,19 +1,11 @@
 #pragma once
 
 #include "tissue_sim/contact/instrument_surface.h"
+#include "tissue_sim/contact/surface_patches.h"
 #include "tissue_sim/geometry/pose.h"
 #include "tissue_sim/scene/scene.h"
 
 namespace tissue_sim {
-
-/// The surface of an organ as contact sees it. Borrowed for the length of a call.
-struct OrganSurface {
-  const std::vector<Vector3>& positions;  ///< scene frame
-  const std::vector<Triangle>& triangles;
-  const MeshTopology& topology;
-  const std::vector<int>& component_roots;  ///< one vertex of each connected surface
-  const AabbTree& tree;                     ///< of the triangles; its boxes may be grown
-};
 
 /// Where an organ edge goes through an instrument triangle. Tip frame.
 struct Crossing {

@@ -24,6 +24,27 @@ struct ClosestOnMesh {
   ClosestOnTriangle on;
 };
 
+/// A search for the point of a mesh nearest to p, triangle by triangle. Of equal distances the lower triangle wins, so
+/// the order in which it looks at them does not matter.
+struct ClosestSearch {
+  const std::vector<Vector3>& vertices;
+  const std::vector<Triangle>& triangles;
+  Vector3 p;
+  double bound;  ///< m^2, what is farther is not looked for
+  ClosestOnMesh best;
+
+  ClosestSearch(const std::vector<Vector3>& of_vertices, const std::vector<Triangle>& of_triangles, const Vector3& from,
+                double reach)
+      : vertices(of_vertices), triangles(of_triangles), p(from), bound(reach * reach) {}
+
+  /// Whether what is at least as far as a box at this squared distance can be skipped. A NaN can. Rounding of the
+  /// distance to a triangle's point may put it a little nearer than the box around it: that is no reason to skip it.
+  bool too_far(double squared_distance) const { return !((1.0 - 1e-12) * squared_distance <= bound); }
+  void look_at(int triangle);
+  /// The same, but for triangles whose box shows that they are too far.
+  void look_at_if_near(int triangle);
+};
+
 /// The point of the mesh nearest to p that is closer than `reach` (m). Of equal distances the lower triangle wins, so
 /// the answer does not depend on the tree. `tree` holds boxes of the triangles, grown or not. `guess` is a triangle
 /// that may well be the nearest, or -1: it changes how long the search takes and not what it finds.

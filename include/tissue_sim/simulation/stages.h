@@ -19,7 +19,7 @@ struct StepContext {
   OrganWorkspace& work() { return workspace.organs[organ]; }
   OrganSurface surface() {
     const RestShape& rest = model().rest;
-    return {state.positions, rest.triangles, rest.topology, rest.component_roots, work().tree};
+    return {state.positions, rest.triangles, rest.topology, rest.component_roots, work().patches};
   }
 };
 
