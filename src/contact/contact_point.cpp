@@ -128,9 +128,12 @@ void add_vertex_contacts(const OrganSurface& organ, const InstrumentSurface& ins
 
   // What the last response put on the surface need not be inside yet, and presses all the same.
   detection.stack.clear();
+  auto colliding = detection.colliding.begin();
   for (const int vertex : touching) {
-    if (std::binary_search(detection.colliding.begin(), detection.colliding.end(), vertex)) continue;
-    const ClosestFeature closest = closest_feature(instrument, local_position(detection, organ, pose, vertex));
+    while (colliding != detection.colliding.end() && *colliding < vertex) ++colliding;
+    if (colliding != detection.colliding.end() && *colliding == vertex) continue;
+    local_position(detection, organ, pose, vertex);
+    const ClosestFeature closest = closest_feature_of(instrument, detection, vertex, 2.0 * contact_margin);
     if (!(std::abs(closest.depth) < contact_margin)) continue;
     points.push_back(
         vertex_contact(organ, piece, vertex, pose.apply(closest.point), pose.orientation * closest.direction));

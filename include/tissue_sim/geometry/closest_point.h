@@ -9,9 +9,9 @@ namespace tissue_sim {
 enum class Feature { corner_0, corner_1, corner_2, rim_0, rim_1, rim_2, face };
 
 struct ClosestOnTriangle {
-  Vector3 point;
-  Vector3 barycentric;  ///< sums to 1, no entry below 0
-  Feature feature;
+  Vector3 point = Vector3::Zero();
+  Vector3 barycentric = Vector3::Zero();  ///< sums to 1, no entry below 0
+  Feature feature = Feature::face;
 };
 
 /// The point of triangle (a, b, c) nearest to p. A degenerate triangle is treated as its longest rim or corner.
