@@ -128,9 +128,12 @@ void add_vertex_contacts(const OrganSurface& organ, const InstrumentSurface& ins
 
   // What the last response put on the surface need not be inside yet, and presses all the same.
   detection.stack.clear();
+  auto colliding = detection.colliding.begin();
   for (const int vertex : touching) {
-    if (std::binary_search(detection.colliding.begin(), detection.colliding.end(), vertex)) continue;
-    const ClosestFeature closest = closest_feature(instrument, local_position(detection, organ, pose, vertex));
+    while (colliding != detection.colliding.end() && *colliding < vertex) ++colliding;
+    if (colliding != detection.colliding.end() && *colliding == vertex) continue;
+    local_position(detection, organ, pose, vertex);
+    const ClosestFeature closest = closest_feature_of(instrument, detection, vertex, 2.0 * contact_margin);
     if (!(std::abs(closest.depth) < contact_margin)) continue;
     points.push_back(
         vertex_contact(organ, piece, vertex, pose.apply(closest.point), pose.orientation * closest.direction));
@@ -188,12 +191,13 @@ void add_poke_contacts(const OrganSurface& organ, const InstrumentSurface& instr
     if (travelled < clearance.free_until[u]) continue;
 
     const Vector3 tip = pose.apply(instrument.vertices[u]);
-    const ClosestOnMesh closest = closest_on_mesh(organ.positions, organ.triangles, organ.tree, tip,
-                                                  std::numeric_limits<double>::max(), clearance.nearest[u]);
+    const ClosestOnMesh closest =
+        closest_on_organ(organ, tip, std::numeric_limits<double>::max(), clearance.nearest[u]);
     if (closest.triangle < 0) continue;  // a position that is not a number is near nothing
     const double distance = std::sqrt(closest.squared_distance);
     clearance.nearest[u] = closest.triangle;
     clearance.free_until[u] = travelled + distance - poke_reach;
+    place_around(organ, closest.triangle);
     const Vector3 outward =
         pseudonormal(organ.positions, organ.triangles, organ.topology, closest.triangle, closest.on.feature);
     const Vector3 above = tip - closest.on.point;

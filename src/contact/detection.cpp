@@ -26,52 +26,56 @@ void set_side(Detection& d, int vertex, Side side) {
   current = current == Side::unknown || current == side ? side : Side::contradicted;
 }
 
-/// Every organ edge near the instrument, once, and their vertices.
-void gather_candidates(const OrganSurface& organ, const InstrumentSurface& instrument, const Pose& pose, Detection& d) {
-  d.candidate_edges.clear();
-  d.candidates.clear();
-  organ.tree.for_each_near(scene_bounds(instrument.bounds, pose), [&](int triangle) {
-    for (const int edge : organ.topology.triangle_edges[triangle]) {
-      if (d.edge_stamp[edge] == d.stamp) continue;
-      d.edge_stamp[edge] = d.stamp;
-      d.crossed_edge_of[edge] = -1;
-      d.candidate_edges.push_back(edge);
-      for (const int vertex : organ.topology.edges[edge]) {
-        if (d.local_stamp[vertex] == d.stamp) continue;
-        local_position(d, organ, pose, vertex);
-        d.candidates.push_back(vertex);
-      }
+/// Pairs of organ edges and instrument triangles that may cross.
+void gather_pairs(const OrganSurface& organ, const InstrumentSurface& instrument, const Pose& pose, Detection& d) {
+  d.pairs.clear();
+  const FlatLists& vertices = organ.patches.vertices;
+  const FlatLists& edges = organ.patches.edges;
+  for_each_patch_near(organ, scene_bounds(instrument.bounds, pose), [&](int patch) {
+    for (const int* v = vertices.begin(patch); v != vertices.end(patch); ++v) {
+      d.local_rounded[*v] = to_float(local_position(d, organ, pose, *v));
     }
+    const auto count = static_cast<std::size_t>(edges.end(patch) - edges.begin(patch));
+    find_crossing_pairs(instrument.tree, d.local_rounded, organ.topology.edges, edges.begin(patch), count, d.tree_room,
+                        d.pairs);
   });
 }
 
-/// Tests one organ edge against the instrument's tree and labels its ends by the first and the last crossing.
-void cross_edge(const OrganSurface& organ, const InstrumentSurface& instrument, int edge, Detection& d) {
+/// Takes the crossings of one edge with the triangles of pairs first .. last - 1 and labels its ends by the first and
+/// the last of them.
+void cross_edge(const OrganSurface& organ, const InstrumentSurface& instrument, std::size_t first_pair,
+                std::size_t last_pair, Detection& d) {
+  const int edge = d.pairs[first_pair].edge;
   const auto& [first, last] = organ.topology.edges[edge];
   const Vector3& p = d.local[first];
   const Vector3& q = d.local[last];
-  Box box;
-  box.add(p);
-  box.add(q);
-  if (!box.overlaps(instrument.bounds)) return;
 
-  const int begin = static_cast<int>(d.crossings.size());
-  instrument.tree.for_each_near(box, [&](int triangle) {
+  const std::size_t begin = d.crossings.size();
+  for (std::size_t pair = first_pair; pair < last_pair; ++pair) {
+    const int triangle = d.pairs[pair].triangle;
     const Triangle& corners = instrument.triangles[triangle];
     const EdgeTriangleHit hit = hit_edge_triangle(
         p, q, {&instrument.vertices[corners[0]], &instrument.vertices[corners[1]], &instrument.vertices[corners[2]]},
         corners);
-    if (hit.direction != 0) d.crossings.push_back({edge, triangle, hit.t, hit.direction, p + hit.t * (q - p)});
-  });
-  const int count = static_cast<int>(d.crossings.size()) - begin;
+    if (hit.direction == 0) continue;
+    d.crossings.push_back({edge, triangle, hit.t, hit.direction, p + hit.t * (q - p)});
+    // Mostly there are one or two: they are put in order as they come.
+    for (std::size_t i = d.crossings.size() - 1; i > begin; --i) {
+      Crossing& before = d.crossings[i - 1];
+      Crossing& after = d.crossings[i];
+      if (before.t < after.t || (before.t == after.t && before.triangle < after.triangle)) break;
+      std::swap(before, after);
+    }
+  }
+  const int count = static_cast<int>(d.crossings.size() - begin);
   if (count == 0) return;
-
-  std::sort(d.crossings.begin() + begin, d.crossings.end(),
-            [](const Crossing& a, const Crossing& b) { return a.t < b.t || (a.t == b.t && a.triangle < b.triangle); });
-  d.crossed_edges.push_back({edge, begin, count});
+  d.edge_stamp[edge] = d.stamp;
+  d.crossed_edge_of[edge] = static_cast<int>(d.unordered.size());
+  d.unordered.push_back({edge, static_cast<int>(begin), count});
+  d.edge_set.add(edge);
 
   bool alternating = true;
-  for (int i = begin + 1; i < begin + count; ++i) {
+  for (std::size_t i = begin + 1; i < d.crossings.size(); ++i) {
     alternating = alternating && d.crossings[i].direction == -d.crossings[i - 1].direction;
   }
   set_side(d, first,
@@ -79,15 +83,31 @@ void cross_edge(const OrganSurface& organ, const InstrumentSurface& instrument, 
            : d.crossings[begin].direction > 0 ? Side::inside
                                               : Side::outside);
   set_side(d, last,
-           !alternating                                   ? Side::contradicted
-           : d.crossings[begin + count - 1].direction < 0 ? Side::inside
-                                                          : Side::outside);
+           !alternating                       ? Side::contradicted
+           : d.crossings.back().direction < 0 ? Side::inside
+                                              : Side::outside);
+}
+
+void cross_edges(const OrganSurface& organ, const InstrumentSurface& instrument, Detection& d) {
+  d.crossings.clear();
+  d.unordered.clear();
+  for (std::size_t first = 0, last = 0; first < d.pairs.size(); first = last) {
+    while (last < d.pairs.size() && d.pairs[last].edge == d.pairs[first].edge) ++last;
+    cross_edge(organ, instrument, first, last, d);
+  }
+  d.stack.clear();
+  d.edge_set.drain_to(d.stack);
+  d.crossed_edges.clear();
+  for (const int edge : d.stack) {
+    d.crossed_edges.push_back(d.unordered[d.crossed_edge_of[edge]]);
+    d.crossed_edge_of[edge] = static_cast<int>(d.crossed_edges.size()) - 1;
+  }
 }
 
 Side decide_by_closest_feature(const InstrumentSurface& instrument, Detection& d, int vertex) {
   ++d.fallbacks;
   Side& side = side_of(d, vertex);
-  side = instrument.bounds.contains(d.local[vertex]) && closest_feature(instrument, d.local[vertex]).depth > 0.0
+  side = instrument.bounds.contains(d.local[vertex]) && closest_feature_of(instrument, d, vertex).depth > 0.0
              ? Side::inside
              : Side::outside;
   return side;
@@ -101,7 +121,7 @@ bool flood_from(const OrganSurface& organ, const Pose& pose, Detection& d) {
     d.colliding.push_back(vertex);
     const FlatLists& edges = organ.topology.vertex_edges;
     for (const int* edge = edges.begin(vertex); edge != edges.end(vertex); ++edge) {
-      if (d.edge_stamp[*edge] == d.stamp && d.crossed_edge_of[*edge] >= 0) continue;
+      if (d.edge_stamp[*edge] == d.stamp) continue;
       const auto& [a, b] = organ.topology.edges[*edge];
       const int next = a == vertex ? b : a;
       Side& side = side_of(d, next);
@@ -132,7 +152,13 @@ void flood(const OrganSurface& organ, const InstrumentSurface& instrument, const
   if (consistent) return;
 
   d.colliding.clear();
-  for (const int vertex : d.candidates) {
+  d.stack.clear();
+  for_each_patch_near(organ, scene_bounds(instrument.bounds, pose), [&](int patch) {
+    const FlatLists& vertices = organ.patches.vertices;
+    for (const int* v = vertices.begin(patch); v != vertices.end(patch); ++v) d.vertex_set.add(*v);
+  });
+  d.vertex_set.drain_to(d.stack);
+  for (const int vertex : d.stack) {
     if (decide_by_closest_feature(instrument, d, vertex) == Side::inside) d.colliding.push_back(vertex);
   }
 }
@@ -158,10 +184,22 @@ void prepare(Detection& d, const OrganSurface& organ) {
   d.side.assign(vertices, Side::unknown);
   d.edge_stamp.assign(edges, 0);
   d.crossed_edge_of.assign(edges, -1);
+  d.nearest.assign(vertices, -1);
+  d.local_rounded.assign(vertices, FloatPoint());
+  d.edge_set.prepare(edges);
+  d.vertex_set.prepare(vertices);
+  d.outside_set.prepare(vertices);
+}
+
+ClosestFeature closest_feature_of(const InstrumentSurface& instrument, Detection& d, int vertex, double reach) {
+  const ClosestFeature closest = closest_feature(instrument, d.local[vertex], reach, d.nearest[vertex]);
+  if (closest.triangle >= 0) d.nearest[vertex] = closest.triangle;
+  return closest;
 }
 
 const Vector3& local_position(Detection& d, const OrganSurface& organ, const Pose& pose, int vertex) {
   if (d.local_stamp[vertex] != d.stamp) {
+    place_vertex(organ, vertex);
     d.local_stamp[vertex] = d.stamp;
     d.local[vertex] = pose.apply_inverse(organ.positions[vertex]) + tie_break;
   }
@@ -171,38 +209,29 @@ const Vector3& local_position(Detection& d, const OrganSurface& organ, const Pos
 void detect(const OrganSurface& organ, const InstrumentSurface& instrument, const Pose& pose, CollidingSet set,
             std::vector<char>& memory, Detection& d) {
   ++d.stamp;
-  d.crossings.clear();
-  d.crossed_edges.clear();
   d.border.clear();
   d.border_outside.clear();
   d.colliding.clear();
 
-  gather_candidates(organ, instrument, pose, d);
-  for (const int edge : d.candidate_edges) cross_edge(organ, instrument, edge, d);
-  std::sort(d.crossed_edges.begin(), d.crossed_edges.end(),
-            [](const CrossedEdge& a, const CrossedEdge& b) { return a.edge < b.edge; });
-  for (std::size_t i = 0; i < d.crossed_edges.size(); ++i) {
-    d.crossed_edge_of[d.crossed_edges[i].edge] = static_cast<int>(i);
-  }
-  for (const int vertex : d.candidates) {
-    if (side_of(d, vertex) == Side::contradicted) decide_by_closest_feature(instrument, d, vertex);
-  }
+  gather_pairs(organ, instrument, pose, d);
+  cross_edges(organ, instrument, d);
   for (const CrossedEdge& crossed : d.crossed_edges) {
     for (const int vertex : organ.topology.edges[crossed.edge]) {
-      (d.side[vertex] == Side::inside ? d.border : d.border_outside).push_back(vertex);
+      if (d.side[vertex] == Side::contradicted) decide_by_closest_feature(instrument, d, vertex);
+      (d.side[vertex] == Side::inside ? d.vertex_set : d.outside_set).add(vertex);
     }
   }
-  for (std::vector<int>* list : {&d.border, &d.border_outside}) {
-    std::sort(list->begin(), list->end());
-    list->erase(std::unique(list->begin(), list->end()), list->end());
-  }
+  d.vertex_set.drain_to(d.border);
+  d.outside_set.drain_to(d.border_outside);
 
   if (set == CollidingSet::paper) {
     remember(organ, pose, memory, d);
-  } else {
-    flood(organ, instrument, pose, d);
-    std::sort(d.colliding.begin(), d.colliding.end());
+    return;
   }
+  flood(organ, instrument, pose, d);
+  for (const int vertex : d.colliding) d.vertex_set.add(vertex);
+  d.colliding.clear();
+  d.vertex_set.drain_to(d.colliding);
 }
 
 }  // namespace tissue_sim

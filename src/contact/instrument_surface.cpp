@@ -45,12 +45,10 @@ InstrumentSurface build_instrument_surface(const TriangleMesh& mesh, bool closed
   surface.closed = closed;
   for (const Vector3& v : mesh.vertices) surface.reach = std::max(surface.reach, v.norm());
 
-  std::vector<Box> boxes;
-  fit_boxes(mesh.vertices, mesh.triangles, 0.0, boxes);
   for (const auto& [a, b, c] : mesh.triangles) {
     surface.normals.push_back(area_normal(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]).stableNormalized());
   }
-  surface.tree.build(boxes);
+  surface.tree = build_wide_tree(mesh.vertices, mesh.triangles);
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
     const int vertex = static_cast<int>(v);
     const int triangle = *surface.topology.vertex_triangles.begin(vertex);
@@ -80,19 +78,18 @@ Box scene_bounds(const Box& box, const Pose& pose) {
   return {centre - half, centre + half};
 }
 
-ClosestFeature closest_feature(const InstrumentSurface& surface, const Vector3& p) {
-  const ClosestOnMesh closest =
-      closest_on_mesh(surface.vertices, surface.triangles, surface.tree, p, std::numeric_limits<double>::max());
-  if (closest.triangle < 0) return {p, Vector3::UnitZ(), -std::numeric_limits<double>::max()};
+ClosestFeature closest_feature(const InstrumentSurface& surface, const Vector3& p, double reach, int guess) {
+  const ClosestOnMesh closest = closest_on_mesh(surface.vertices, surface.triangles, surface.tree, p, reach, guess);
+  if (closest.triangle < 0) return {p, Vector3::UnitZ(), -std::numeric_limits<double>::max(), -1};
   const Vector3 normal =
       pseudonormal(surface.vertices, surface.triangles, surface.topology, closest.triangle, closest.on.feature)
           .stableNormalized();
   const Vector3 way_out = closest.on.point - p;
   const double distance = std::sqrt(closest.squared_distance);
   const bool inside = way_out.dot(normal) > 0.0;
-  if (distance < on_surface) return {closest.on.point, normal, inside ? distance : -distance};
-  if (inside) return {closest.on.point, way_out / distance, distance};
-  return {closest.on.point, -way_out / distance, -distance};
+  if (distance < on_surface) return {closest.on.point, normal, inside ? distance : -distance, closest.triangle};
+  if (inside) return {closest.on.point, way_out / distance, distance, closest.triangle};
+  return {closest.on.point, -way_out / distance, -distance, closest.triangle};
 }
 
 }  // namespace tissue_sim

@@ -23,7 +23,7 @@ double inverse_square_weight(const Vector3& a, const Vector3& b) {
   return 1.0 / std::max((a - b).squaredNorm(), shortest_distance * shortest_distance);
 }
 
-void penetrate_border(const OrganSurface& organ, const InstrumentSurface& instrument, const Detection& detection,
+void penetrate_border(const OrganSurface& organ, const InstrumentSurface& instrument, Detection& detection,
                       Penetration& penetration) {
   for (const int vertex : detection.border) {
     const Vector3& p = detection.local[vertex];
@@ -32,7 +32,7 @@ void penetrate_border(const OrganSurface& organ, const InstrumentSurface& instru
     Vector3 normal_sum = Vector3::Zero();
     const FlatLists& edges = organ.topology.vertex_edges;
     for (const int* edge = edges.begin(vertex); edge != edges.end(vertex); ++edge) {
-      if (detection.edge_stamp[*edge] != detection.stamp || detection.crossed_edge_of[*edge] < 0) continue;
+      if (detection.edge_stamp[*edge] != detection.stamp) continue;
       const CrossedEdge& crossed = detection.crossed_edges[detection.crossed_edge_of[*edge]];
       const bool leaves_from_start = organ.topology.edges[*edge][0] == vertex;
       const Crossing& crossing =
@@ -53,14 +53,14 @@ void penetrate_border(const OrganSurface& organ, const InstrumentSurface& instru
   }
 }
 
-void take_closest_feature(const InstrumentSurface& instrument, const Detection& detection, int vertex,
+void take_closest_feature(const InstrumentSurface& instrument, Detection& detection, int vertex,
                           Penetration& penetration) {
-  const ClosestFeature closest = closest_feature(instrument, detection.local[vertex]);
+  const ClosestFeature closest = closest_feature_of(instrument, detection, vertex);
   penetration.depth[vertex] = std::max(0.0, closest.depth);
   penetration.direction[vertex] = closest.direction;
 }
 
-void penetrate_exactly(const InstrumentSurface& instrument, const Detection& detection, Penetration& penetration) {
+void penetrate_exactly(const InstrumentSurface& instrument, Detection& detection, Penetration& penetration) {
   for (const int vertex : detection.colliding) {
     take_closest_feature(instrument, detection, vertex, penetration);
   }

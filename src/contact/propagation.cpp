@@ -19,7 +19,7 @@ void for_each_neighbour(const MeshTopology& topology, int vertex, Visit&& visit)
   }
 }
 
-void take_from_neighbours(const OrganSurface& organ, const InstrumentSurface& instrument, const Detection& detection,
+void take_from_neighbours(const OrganSurface& organ, const InstrumentSurface& instrument, Detection& detection,
                           int vertex, int layer, Penetration& penetration) {
   const Vector3& p = detection.local[vertex];
   double weight_sum = 0.0;
@@ -46,7 +46,7 @@ void take_from_neighbours(const OrganSurface& organ, const InstrumentSurface& in
 
 }  // namespace
 
-void propagate(const OrganSurface& organ, const InstrumentSurface& instrument, const Detection& detection,
+void propagate(const OrganSurface& organ, const InstrumentSurface& instrument, Detection& detection,
                Penetration& penetration) {
   std::vector<int>& layer = penetration.layer;
   std::vector<int>& next_layer = penetration.next_layer;
@@ -63,7 +63,9 @@ void propagate(const OrganSurface& organ, const InstrumentSurface& instrument, c
         next_layer.push_back(neighbour);
       });
     }
-    std::sort(next_layer.begin(), next_layer.end());
+    for (const int vertex : next_layer) detection.vertex_set.add(vertex);
+    next_layer.clear();
+    detection.vertex_set.drain_to(next_layer);
     for (const int vertex : next_layer) {
       take_from_neighbours(organ, instrument, detection, vertex, depth, penetration);
     }

@@ -57,22 +57,29 @@ ClosestOnTriangle closest_on_triangle(const Vector3& p, const Vector3& a, const 
   return best;
 }
 
+void ClosestSearch::look_at(int triangle) {
+  const auto& [a, b, c] = triangles[triangle];
+  const ClosestOnTriangle on = closest_on_triangle(p, vertices[a], vertices[b], vertices[c]);
+  const double distance = (on.point - p).squaredNorm();
+  if (distance < bound || (distance == bound && best.triangle >= 0 && triangle < best.triangle)) {
+    bound = distance;
+    best = {triangle, distance, on};
+  }
+}
+
+void ClosestSearch::look_at_if_near(int triangle) {
+  const auto& [a, b, c] = triangles[triangle];
+  const Box box = {vertices[a].cwiseMin(vertices[b]).cwiseMin(vertices[c]),
+                   vertices[a].cwiseMax(vertices[b]).cwiseMax(vertices[c])};
+  if (!too_far(box.squared_distance(p))) look_at(triangle);
+}
+
 ClosestOnMesh closest_on_mesh(const std::vector<Vector3>& vertices, const std::vector<Triangle>& triangles,
                               const AabbTree& tree, const Vector3& p, double reach, int guess) {
-  ClosestOnMesh best;
-  double bound = reach * reach;
-  const auto look_at = [&](int triangle, double& nearest) {
-    const auto& [a, b, c] = triangles[triangle];
-    const ClosestOnTriangle on = closest_on_triangle(p, vertices[a], vertices[b], vertices[c]);
-    const double distance = (on.point - p).squaredNorm();
-    if (distance < nearest || (distance == nearest && best.triangle >= 0 && triangle < best.triangle)) {
-      nearest = distance;
-      best = {triangle, distance, on};
-    }
-  };
-  if (guess >= 0) look_at(guess, bound);
-  tree.for_each_by_distance(p, bound, look_at);
-  return best;
+  ClosestSearch search(vertices, triangles, p, reach);
+  if (guess >= 0) search.look_at(guess);
+  tree.for_each_by_distance(p, search.bound, [&](int triangle, double&) { search.look_at(triangle); });
+  return search.best;
 }
 
 Vector3 pseudonormal(const std::vector<Vector3>& vertices, const std::vector<Triangle>& triangles,

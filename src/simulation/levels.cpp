@@ -274,9 +274,16 @@ void press_coarser(const OrganModel& model, const std::vector<ContactPoint>& poi
   }
 }
 
-void place(const OrganModel& model, int vertex, OrganState& state) {
-  if (state.region.mark[vertex] != Part::asleep) return;
-  state.positions[vertex] = model.rest.positions[vertex] + by_coarser(model, 0, vertex, state).displacement;
+void place(const OrganModel& model, const int* first, const int* last, OrganState& state) {
+  for (const int* v = first; v != last; ++v) {
+    if (state.region.mark[*v] != Part::asleep) continue;
+    state.positions[*v] = model.rest.positions[*v] + by_coarser(model, 0, *v, state).displacement;
+  }
+}
+
+void place_surface(const OrganModel& model, OrganState& state) {
+  if (model.levels.empty()) return;
+  for (int v = 0; v < model.rest.surface_vertices; ++v) place(model, &v, &v + 1, state);
 }
 
 }  // namespace tissue_sim

@@ -20,9 +20,6 @@ constexpr int most_motion_substeps = 300;
 /// micrometre.
 constexpr double sleep_speed = 1e-7;
 
-/// Of a mean edge: how much the boxes of an organ's tree are grown, so that it is refitted after that much motion only.
-constexpr double slack_fraction = 0.2;
-
 /// Contacts of a step that are made room for from the start: more than a tool makes, so that a warm step allocates
 /// nothing.
 constexpr std::size_t usual_contacts = 256;
@@ -42,12 +39,6 @@ class Lap {
 
 double angle_between(const Pose& a, const Pose& b) {
   return a.orientation.angularDistance(b.orientation);
-}
-
-void fit_tree(const OrganModel& model, const OrganState& state, OrganWorkspace& work) {
-  fit_boxes(state.positions, model.rest.triangles, work.slack, work.boxes);
-  work.tree.refit(work.boxes);
-  work.travel = 0.0;
 }
 
 Vector3 velocity_of(const Pose& before, const Pose& now, const Vector3& point, double dt) {
@@ -165,9 +156,9 @@ double integrate_elements(StepContext& context) {
   return speed;
 }
 
-/// What has moved by itself: the tree and the clearances have to know.
+/// What has moved by itself: the patches and the clearances have to know.
 void note_motion(StepContext& context, double way) {
-  context.work().travel += way;
+  context.work().patches.travel += way;
   for (Clearance& clearance : context.state.clearances) clearance.shift += way;
 }
 
@@ -190,13 +181,11 @@ Workspace build_workspace(const World& world) {
     const OrganModel& model = world.organs[organ];
     const RestShape& rest = model.rest;
     OrganWorkspace& work = workspace.organs.emplace_back();
-    work.slack = slack_fraction * rest.mean_edge;
-    fit_boxes(rest.positions, rest.triangles, 0.0, work.boxes);
-    work.tree.build(work.boxes);
+    work.patches = build_patches(rest.positions, rest.triangles, rest.topology);
     work.detections.resize(world.pieces.size());
     work.penetrations.resize(world.pieces.size());
     work.near.assign(world.pieces.size(), 0);
-    const OrganSurface surface = {rest.positions, rest.triangles, rest.topology, rest.component_roots, work.tree};
+    const OrganSurface surface = {rest.positions, rest.triangles, rest.topology, rest.component_roots, work.patches};
     for (std::size_t p = 0; p < world.pieces.size(); ++p) {
       prepare(work.detections[p], surface);
       prepare(work.penetrations[p], surface);
@@ -221,7 +210,7 @@ Workspace build_workspace(const World& world) {
 }
 
 void forget(OrganWorkspace& work) {
-  work.travel = 1e300;
+  forget(work.patches);
 }
 
 void begin_report(const World& world, const Motion& motion, StepReport& report) {
@@ -258,7 +247,7 @@ int count_substeps(StepContext& context) {
     Box swept = scene_bounds(piece.surface.bounds, motion.from);
     swept.add(scene_bounds(piece.surface.bounds, motion.to));
     // Between the two a rotation can leave both boxes by no more than the whole way.
-    if (!swept.grown(way).overlaps(work.tree.bounds().grown(work.travel))) continue;
+    if (!swept.grown(way).overlaps(bounds_of(work.patches))) continue;
     farthest = std::max(farthest, way);
     near = true;
   }
@@ -295,18 +284,14 @@ void place_instruments(StepContext& context, int substep, int substeps) {
 void refit(StepContext& context) {
   const Lap lap(context.report.profile.refit);
   OrganWorkspace& work = context.work();
-  bool any_near = false;
+  const OrganSurface surface = context.surface();
   for (std::size_t p = 0; p < context.world.pieces.size(); ++p) {
     const InstrumentPiece& piece = context.world.pieces[p];
     const bool placed = context.motion.instruments[piece.instrument].placed;
-    const Box box = scene_bounds(piece.surface.bounds, context.workspace.now[piece.instrument]).grown(contact_margin);
-    work.near[p] = placed && box.overlaps(work.tree.bounds().grown(work.travel)) ? 1 : 0;
-    any_near = any_near || work.near[p] != 0;
+    const Box box = scene_bounds(piece.surface.bounds, context.workspace.now[piece.instrument]).grown(poke_reach);
+    work.near[p] = placed && box.overlaps(bounds_of(work.patches)) ? 1 : 0;
+    if (work.near[p]) for_each_patch_near(surface, box, [](int) {});
   }
-  if (any_near && !context.model().levels.empty()) {
-    for (int v = 0; v < context.model().rest.surface_vertices; ++v) place(context.model(), v, context.state);
-  }
-  if (any_near && work.travel > work.slack) fit_tree(context.model(), context.state, work);
 }
 
 void find_crossings(StepContext& context) {

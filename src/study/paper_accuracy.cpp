@@ -19,21 +19,17 @@ constexpr int path_stride = 5;         ///< of the path's steps: neighbours diff
 struct Pair {
   explicit Pair(const PaperTest& test)
       : organ(build_rest_shape(paper_scene(test, Approach::contact_only).organs.front())),
+        patches(build_patches(organ.positions, organ.triangles, organ.topology)),
         instrument(build_instrument_surface(make_sphere(paper_radius, test.rigid), true)),
         memory(organ.positions.size(), 0) {
-    std::vector<Box> boxes;
-    fit_boxes(organ.positions, organ.triangles, 0.0, boxes);
-    tree.build(boxes);
     prepare(detection, surface());
     prepare(penetration, surface());
   }
-  OrganSurface surface() const {
-    return {organ.positions, organ.triangles, organ.topology, organ.component_roots, tree};
-  }
+  OrganSurface surface() { return {organ.positions, organ.triangles, organ.topology, organ.component_roots, patches}; }
 
   RestShape organ;
+  SurfacePatches patches;
   InstrumentSurface instrument;
-  AabbTree tree;
   Detection detection;
   Penetration penetration;
   std::vector<char> memory;

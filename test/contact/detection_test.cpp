@@ -2,6 +2,7 @@
 
 #include <set>
 
+#include "contact/plain_detection.h"
 #include "contact/test_organ.h"
 #include "tissue_sim/geometry/edge_triangle.h"
 
@@ -44,6 +45,75 @@ TEST(Detection, CrossingsEqualBruteForce) {
       found += static_cast<int>(expected.size());
     }
     EXPECT_GT(found, 200);
+  }
+}
+
+void expect_same(const Detection& found, const PlainDetection& plain) {
+  EXPECT_EQ(found.border, plain.border);
+  EXPECT_EQ(found.border_outside, plain.border_outside);
+  ASSERT_EQ(found.crossed_edges.size(), plain.crossed_edges.size());
+  ASSERT_EQ(found.crossings.size(), plain.crossings.size());
+  for (std::size_t e = 0; e < plain.crossed_edges.size(); ++e) {
+    const CrossedEdge& a = found.crossed_edges[e];
+    const CrossedEdge& b = plain.crossed_edges[e];
+    ASSERT_EQ(a.edge, b.edge);
+    ASSERT_EQ(a.count, b.count);
+    for (int i = 0; i < b.count; ++i) {
+      const Crossing& x = found.crossings[a.first + i];
+      const Crossing& y = plain.crossings[b.first + i];
+      EXPECT_EQ(x.edge, y.edge);
+      EXPECT_EQ(x.triangle, y.triangle);
+      EXPECT_EQ(x.t, y.t);
+      EXPECT_EQ(x.direction, y.direction);
+      EXPECT_EQ(x.point, y.point);
+    }
+  }
+}
+
+/// What carries over from pass to pass saves time and changes nothing: an organ that is kneaded and an instrument that
+/// wanders, now and then somewhere else at once, against every edge and triangle, and against a pass that knows
+/// nothing.
+TEST(Detection, OfARandomMotionIsToTheBitWhatEveryEdgeAndTriangleGive) {
+  Random random(6);
+  for (const TriangleMesh& mesh : instruments()) {
+    const InstrumentSurface instrument = build_instrument_surface(mesh, true);
+    TestOrgan organ(make_octasphere(0.03, 3));
+    const TriangleMesh at_rest = organ.mesh;
+    Pose pose = random_pose(random, 0.03);
+    std::size_t found = 0;
+    for (int pass = 0; pass < 150; ++pass) {
+      if (pass % 40 == 39) {
+        pose = random_pose(random, 0.04);
+      } else {
+        pose.position += random_point(random, 0.002);
+        pose.orientation = Eigen::Quaterniond(Eigen::AngleAxisd(0.05, random_direction(random))) * pose.orientation;
+      }
+      if (pass % 60 == 59) {
+        organ.mesh = at_rest;
+        forget(organ.patches);
+      }
+      const double way = pass % 7 == 0 ? 0.0 : 0.001;
+      for (Vector3& v : organ.mesh.vertices) v += random_in(random, 0.0, way) * random_direction(random);
+      organ.patches.travel += way;
+      const std::vector<int> colliding = organ.detect_in(instrument, pose);
+
+      std::vector<Vector3> local;
+      for (int v = 0; v < static_cast<int>(organ.mesh.vertices.size()); ++v) {
+        local.push_back(local_position(organ.detection, organ.surface(), pose, v));
+      }
+      expect_same(organ.detection, detect_plainly(local, organ.topology, instrument));
+      found += organ.detection.crossings.size();
+
+      TestOrgan fresh(organ.mesh);
+      EXPECT_EQ(fresh.detect_in(instrument, pose), colliding);
+      penetrate_exactly(instrument, organ.detection, organ.penetration);
+      penetrate_exactly(instrument, fresh.detection, fresh.penetration);
+      for (const int v : colliding) {
+        EXPECT_EQ(organ.penetration.depth[v], fresh.penetration.depth[v]);
+        EXPECT_EQ(organ.penetration.direction[v], fresh.penetration.direction[v]);
+      }
+    }
+    EXPECT_GT(found, 1000u);
   }
 }
 
@@ -183,7 +253,7 @@ TEST(Detection, AnOpenInstrumentCollidesAtItsSurfaceOnly) {
 TEST(Detection, PositionsThatAreNoNumbersCollideWithNothing) {
   TestOrgan organ(make_octasphere(0.02, 1));
   organ.mesh.vertices[3].y() = std::nan("");
-  organ.tree.refit(boxes_of(organ.mesh));
+  forget(organ.patches);
   const InstrumentSurface instrument = build_instrument_surface(make_octasphere(0.02, 2), true);
   organ.detect_in(instrument, at(0.02, 0.0, 0.0));
   for (const Crossing& crossing : organ.detection.crossings) EXPECT_TRUE(crossing.point.allFinite());

@@ -14,7 +14,7 @@ struct TestOrgan {
   TriangleMesh mesh;
   MeshTopology topology;
   std::vector<int> roots;
-  AabbTree tree;
+  mutable SurfacePatches patches;  ///< fitted by whoever looks
   Detection detection;
   Penetration penetration;
   std::vector<char> memory;
@@ -22,7 +22,7 @@ struct TestOrgan {
   explicit TestOrgan(const TriangleMesh& surface_mesh)
       : mesh(surface_mesh),
         topology(build_topology(static_cast<int>(mesh.vertices.size()), mesh.triangles)),
-        tree(tree_of(mesh)),
+        patches(build_patches(mesh.vertices, mesh.triangles, topology)),
         memory(mesh.vertices.size(), 0) {
     std::vector<char> seen(mesh.vertices.size(), 0);
     for (int root = 0; root < static_cast<int>(seen.size()); ++root) {
@@ -42,11 +42,11 @@ struct TestOrgan {
     prepare(penetration, surface());
   }
 
-  OrganSurface surface() const { return {mesh.vertices, mesh.triangles, topology, roots, tree}; }
+  OrganSurface surface() const { return {mesh.vertices, mesh.triangles, topology, roots, patches}; }
 
   void move(const Pose& pose) {
     mesh = moved(mesh, pose);
-    tree.refit(boxes_of(mesh));
+    forget(patches);
   }
 
   const std::vector<int>& detect_in(const InstrumentSurface& instrument, const Pose& pose = Pose(),

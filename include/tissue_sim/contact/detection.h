@@ -1,19 +1,12 @@
 #pragma once
 
+#include "tissue_sim/contact/ascending_set.h"
 #include "tissue_sim/contact/instrument_surface.h"
+#include "tissue_sim/contact/surface_patches.h"
 #include "tissue_sim/geometry/pose.h"
 #include "tissue_sim/scene/scene.h"
 
 namespace tissue_sim {
-
-/// The surface of an organ as contact sees it. Borrowed for the length of a call.
-struct OrganSurface {
-  const std::vector<Vector3>& positions;  ///< scene frame
-  const std::vector<Triangle>& triangles;
-  const MeshTopology& topology;
-  const std::vector<int>& component_roots;  ///< one vertex of each connected surface
-  const AabbTree& tree;                     ///< of the triangles; its boxes may be grown
-};
 
 /// Where an organ edge goes through an instrument triangle. Tip frame.
 struct Crossing {
@@ -46,12 +39,19 @@ struct Detection {
   std::vector<int> crossed_edge_of;        ///< per edge, into crossed_edges, where edge_stamp is the current one
 
   int stamp = 0;
-  std::vector<int> edge_stamp;
+  std::vector<int> edge_stamp;  ///< the current one: the edge is crossed
   std::vector<int> local_stamp;
   std::vector<int> side_stamp;
-  std::vector<Side> side;  ///< per vertex, where side_stamp is the current one
-  std::vector<int> candidate_edges;
-  std::vector<int> candidates;  ///< vertices of the candidate edges
+  std::vector<Side> side;    ///< per vertex, where side_stamp is the current one
+  std::vector<int> nearest;  ///< per vertex: the triangle of the instrument found last, or -1; a guess for the next
+                             ///< search, which makes it shorter and changes nothing else
+  std::vector<FloatPoint> local_rounded;  ///< of `local`
+  std::vector<EdgeTrianglePair> pairs;    ///< that may cross
+  WideTreeRoom tree_room;
+  AscendingSet edge_set;
+  AscendingSet vertex_set;
+  AscendingSet outside_set;
+  std::vector<CrossedEdge> unordered;
   std::vector<int> stack;
   int fallbacks = 0;  ///< vertices decided by the closest feature, in all
 };
@@ -66,6 +66,10 @@ void prepare(Detection& detection, const OrganSurface& organ);
 /// `paper` only.
 void detect(const OrganSurface& organ, const InstrumentSurface& instrument, const Pose& pose, CollidingSet set,
             std::vector<char>& memory, Detection& detection);
+
+/// closest_feature() of an organ vertex, from where the last one was found.
+ClosestFeature closest_feature_of(const InstrumentSurface& instrument, Detection& detection, int vertex,
+                                  double reach = std::numeric_limits<double>::max());
 
 /// Position of an organ vertex in the tip frame.
 const Vector3& local_position(Detection& detection, const OrganSurface& organ, const Pose& pose, int vertex);

@@ -1,9 +1,11 @@
 #pragma once
 
-#include "tissue_sim/geometry/aabb_tree.h"
+#include <limits>
+
 #include "tissue_sim/geometry/closest_point.h"
 #include "tissue_sim/geometry/pose.h"
 #include "tissue_sim/geometry/triangle_mesh.h"
+#include "tissue_sim/geometry/wide_tree.h"
 
 namespace tissue_sim {
 
@@ -16,7 +18,7 @@ struct InstrumentSurface {
   std::vector<Vector3> normals;         ///< unit, one a triangle; zero where it is degenerate
   std::vector<Vector3> vertex_normals;  ///< unit, one a vertex, angle-weighted
   std::vector<double> radii;  ///< m, one a vertex: of the curve of the surface there, 0 at corners and sharp edges
-  AabbTree tree;
+  WideTree tree;
   Box bounds;
   double reach = 0.0;  ///< of its farthest point from the tip
   bool closed = true;
@@ -35,10 +37,14 @@ struct ClosestFeature {
   Vector3 point;
   Vector3 direction;  ///< unit, out of the instrument
   double depth;       ///< m, positive inside
+  int triangle = -1;  ///< that has the point
 };
 
 /// Exact depth and direction of p (tip frame). The sign is that of the pseudonormal at the closest feature; where p
-/// lies on the surface the direction is that normal. A position that is not a number is outside, far away.
-ClosestFeature closest_feature(const InstrumentSurface& surface, const Vector3& p);
+/// lies on the surface the direction is that normal. A position that is not a number is outside, far away, and so is
+/// what is farther than `reach` (m) from the surface. `guess` is a triangle that may well be the closest, or -1: it
+/// changes how long the search takes and not what it finds.
+ClosestFeature closest_feature(const InstrumentSurface& surface, const Vector3& p,
+                               double reach = std::numeric_limits<double>::max(), int guess = -1);
 
 }  // namespace tissue_sim

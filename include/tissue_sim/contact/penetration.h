@@ -24,14 +24,14 @@ double inverse_square_weight(const Vector3& a, const Vector3& b);
 /// edge, and the normals n_i of the triangles crossed there: depth = sum w_i (x_i - p) . n_i / sum w_i, direction = sum
 /// w_i n_i, unit. Where the normals cancel (a thin instrument) or none is left, the closest feature gives the
 /// direction, or both.
-void penetrate_border(const OrganSurface& organ, const InstrumentSurface& instrument, const Detection& detection,
+void penetrate_border(const OrganSurface& organ, const InstrumentSurface& instrument, Detection& detection,
                       Penetration& penetration);
 
 /// Depth and direction of one vertex from the closest feature of the instrument; no depth where the vertex is outside.
-void take_closest_feature(const InstrumentSurface& instrument, const Detection& detection, int vertex,
+void take_closest_feature(const InstrumentSurface& instrument, Detection& detection, int vertex,
                           Penetration& penetration);
 
 /// The exact way in place of stages 2 and 3: the closest point of the instrument for every colliding vertex.
-void penetrate_exactly(const InstrumentSurface& instrument, const Detection& detection, Penetration& penetration);
+void penetrate_exactly(const InstrumentSurface& instrument, Detection& detection, Penetration& penetration);
 
 }  // namespace tissue_sim

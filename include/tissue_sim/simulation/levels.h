@@ -39,7 +39,11 @@ void follow_coarser(const OrganModel& model, double dt, OrganState& state);
 /// Hands the impulses of the contact points to the coarser levels.
 void press_coarser(const OrganModel& model, const std::vector<ContactPoint>& points, OrganState& state);
 
-/// Where the levels have a vertex of the organ that is asleep. Vertices that are awake stay.
-void place(const OrganModel& model, int vertex, OrganState& state);
+/// Puts vertices of the organ (first .. last - 1 are their numbers) that are asleep where the levels have them. Those
+/// that are awake stay.
+void place(const OrganModel& model, const int* first, const int* last, OrganState& state);
+
+/// The same for the whole surface.
+void place_surface(const OrganModel& model, OrganState& state);
 
 }  // namespace tissue_sim

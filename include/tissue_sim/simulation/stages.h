@@ -19,9 +19,18 @@ struct StepContext {
 
   const OrganModel& model() const { return world.organs[organ]; }
   OrganWorkspace& work() { return workspace.organs[organ]; }
+  /// Of surface vertices that the step does not move: contact asks for those it looks at.
+  Placement placement() {
+    if (model().levels.empty()) return {};
+    const auto place_some = [](void* context, const int* first, const int* last) {
+      StepContext& here = *static_cast<StepContext*>(context);
+      place(here.model(), first, last, here.state);
+    };
+    return {place_some, this};
+  }
   OrganSurface surface() {
     const RestShape& rest = model().rest;
-    return {state.positions, rest.triangles, rest.topology, rest.component_roots, work().tree};
+    return {state.positions, rest.triangles, rest.topology, rest.component_roots, work().patches, placement()};
   }
 };
 

@@ -25,13 +25,10 @@ struct Motion {
   bool forces_wanted = true;  ///< false: contacts and wrenches carry none; nothing else differs
 };
 
-/// Room for one organ's step. Holds nothing that changes what the next step does: how far the tree's boxes have been
-/// outrun saves work only.
+/// Room for one organ's step. Holds nothing that changes what the next step does: how far the boxes of its patches
+/// have been outrun saves work only.
 struct OrganWorkspace {
-  std::vector<Box> boxes;
-  AabbTree tree;                          ///< of the organ's triangles, its boxes grown by `slack`
-  double slack = 0.0;                     ///< m
-  double travel = 0.0;                    ///< m, at most this far has any vertex gone since the tree was fitted
+  SurfacePatches patches;                 ///< of the organ's surface
   std::vector<Detection> detections;      ///< per piece
   std::vector<Penetration> penetrations;  ///< per piece
   std::vector<char> near;                 ///< per piece: its box and the organ's overlap in this substep
@@ -56,7 +53,7 @@ struct Workspace {
 
 Workspace build_workspace(const World& world);
 
-/// To be called after an organ was put somewhere from outside the step: its tree no longer holds it.
+/// To be called after an organ was put somewhere from outside the step: its patches no longer hold it.
 void forget(OrganWorkspace& organ);
 
 /// One step. `report.step` and `report.stamp` are the caller's; everything else in the report is written.
