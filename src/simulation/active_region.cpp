@@ -87,18 +87,16 @@ void recentre(const RegionModel& model, const RestShape& shape, const std::vecto
 
   // What was free and is not any more falls asleep; what is free and was not wakes.
   region.band.clear();
-  region.reach.clear();
   for (const int v : before) region.mark[v] = Part::driven;
-  for (std::size_t i = 0; i < region.free.size(); ++i) {
-    const int v = region.free[i];
+  for (const int v : region.free) {
     if (region.mark[v] == Part::asleep) room.woken.push_back(v);
     region.mark[v] = Part::free;
     const double reach = 1.0 - (model.radius - room.distance[v]) / model.band;
     if (!(reach > 0.0)) continue;
-    region.band.push_back(static_cast<int>(i));
-    region.reach.push_back(reach);
+    region.band.emplace_back();
+    region.band.back().vertex = v;
+    region.band.back().reach = reach;
   }
-  region.target.resize(region.band.size());
   std::size_t fallen = 0;
   for (const int v : before) {
     if (region.mark[v] == Part::free) continue;

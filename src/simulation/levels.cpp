@@ -72,10 +72,17 @@ void follow(const OrganModel& model, std::size_t level, OrganState& state) {
     at.positions[v] = at.shape.positions[v] + to.displacement;
     at.velocities[v] = to.velocity;
   }
-  for (std::size_t i = 0; i < at.region.band.size(); ++i) {
-    const int v = at.region.free[at.region.band[i]];
-    at.region.target[i] = at.shape.positions[v] + by_coarser(model, level, v, state).displacement;
+  for (BandVertex& band : at.region.band) {
+    const Moved to = by_coarser(model, level, band.vertex, state);
+    band.target = at.shape.positions[band.vertex] + to.displacement;
+    band.velocity = to.velocity;
   }
+}
+
+/// The same for the time dt (s) in which the coarser level moves on in a line.
+void follow_on(double dt, const LevelView& at) {
+  for (const int v : at.region.driven) at.positions[v] += dt * at.velocities[v];
+  for (BandVertex& band : at.region.band) band.target += dt * band.velocity;
 }
 
 /// N/m of a band's spring: 0 where the band begins, and what fixes the vertex at the radius. No stiffer than a substep
@@ -138,11 +145,10 @@ double move_level(const OrganModel& model, std::size_t level, const Vector3& gra
   region_forces(at.shape, at.positions, at.velocities, at.region, room);
   const double slowed = 1.0 / (1.0 + dt * model.drag);
   double fastest = 0.0;
-  const double stiffness = 1.0 * model.shear_modulus * edge_of(model, level);
-  for (std::size_t i = 0; i < at.region.band.size(); ++i) {
-    const int v = at.region.free[at.region.band[i]];
-    const double k = band_stiffness(at.region.reach[i], at.shape.mass[v], stiffness, dt);
-    own.push[v] += dt * k * (at.region.target[i] - at.positions[v]);
+  const double stiffness = model.shear_modulus * edge_of(model, level);
+  for (const BandVertex& band : at.region.band) {
+    const double k = band_stiffness(band.reach, at.shape.mass[band.vertex], stiffness, dt);
+    own.push[band.vertex] += dt * k * (band.target - at.positions[band.vertex]);
   }
   for (const int v : at.region.free) {
     const Vector3 force = room.forces[v].head<3>().cast<double>();
@@ -231,31 +237,25 @@ double move_coarser(const OrganModel& model, const Vector3& gravity, int substep
     const int every = substeps / at.substeps;
     if ((substep - 1) % every != 0) continue;
     fastest = std::max(fastest, move_level(model, level, gravity, every * dt, state, room.elements[level - 1]));
+    if (level < model.levels.size()) follow_on(every * dt, view(model, level, state));
     at.ahead = every * dt;
-    if (level == model.levels.size()) continue;
-    // The coarser level as it will be at the end of this one's substep.
-    LevelState& coarser = state.levels[level];
-    coarser.ahead -= every * dt;
-    follow(model, level, state);
-    coarser.ahead += every * dt;
+    follow(model, level - 1, state);  // from where it is now: what has been followed so far ends here
   }
   for (std::size_t p = 0; p < state.untouched.size(); ++p) state.untouched[p] += dt;
   return fastest;
 }
 
 void add_band_forces(const OrganModel& model, double dt, OrganState& state) {
-  const ActiveRegion& region = state.region;
   const double stiffness = model.shear_modulus * model.fine_edge;
-  for (std::size_t i = 0; i < region.band.size(); ++i) {
-    const int v = region.free[region.band[i]];
-    const double k = band_stiffness(region.reach[i], model.rest.mass[v], stiffness, dt);
-    state.forces[v] += k * (region.target[i] - state.positions[v]);
+  for (const BandVertex& band : state.region.band) {
+    const double k = band_stiffness(band.reach, model.rest.mass[band.vertex], stiffness, dt);
+    state.forces[band.vertex] += k * (band.target - state.positions[band.vertex]);
   }
 }
 
 void follow_coarser(const OrganModel& model, double dt, OrganState& state) {
   for (LevelState& level : state.levels) level.ahead = std::max(0.0, level.ahead - dt);
-  follow(model, 0, state);
+  follow_on(dt, view(model, 0, state));
 }
 
 void press_coarser(const OrganModel& model, const std::vector<ContactPoint>& points, OrganState& state) {

@@ -108,17 +108,25 @@ std::size_t count_memories(const World& world, const RestShape& rest) {
   return memories;
 }
 
-/// Points start from the force that was found for them in the substep before.
-void remember_forces(const World& world, const RestShape& rest, const OrganState& state, OrganWorkspace& work) {
-  for (const PlaceForce& pressing : state.pressing) work.force_of[pressing.place] = pressing.force;
-  for (ContactPoint& point : work.points) point.force = work.force_of[memory_of(point, world, rest)];
-  for (const PlaceForce& pressing : state.pressing) work.force_of[pressing.place] = 0.0;
+/// Points start from what was found for them in the substep before.
+void remember_forces(const StepContext& context, OrganWorkspace& work) {
+  const RestShape& rest = context.model().rest;
+  const std::vector<PlaceForce>& pressing = context.state.pressing;
+  for (std::size_t i = 0; i < pressing.size(); ++i) work.pressing_of[pressing[i].place] = static_cast<int>(i);
+  for (ContactPoint& point : work.points) {
+    const int i = work.pressing_of[memory_of(point, context.world, rest)];
+    if (i < 0) continue;
+    point.force = pressing[i].force;
+    if (context.model().integrator == Integrator::explicit_substeps) point.impulse = context.dt * pressing[i].stopping;
+  }
+  for (const PlaceForce& was : pressing) work.pressing_of[was.place] = -1;
 }
 
-void keep_forces(const World& world, const RestShape& rest, const OrganWorkspace& work, OrganState& state) {
-  state.pressing.clear();
-  for (const ContactPoint& point : work.points) {
-    state.pressing.push_back({memory_of(point, world, rest), point.force});
+void keep_forces(StepContext& context) {
+  context.state.pressing.clear();
+  for (const ContactPoint& point : context.work().points) {
+    context.state.pressing.push_back(
+        {memory_of(point, context.world, context.model().rest), point.force, point.impulse / context.dt});
   }
 }
 
@@ -127,11 +135,11 @@ double integrate_elements(StepContext& context) {
   const OrganModel& model = context.model();
   OrganState& state = context.state;
   OrganWorkspace& work = context.work();
+  remember_forces(context, work);
   if (model.integrator == Integrator::vertex_block_descent) {
     stop_at_instrument(work.points, model.rest.inverse_mass, state.positions, context.dt, state.velocities);
-    remember_forces(context.world, model.rest, state, work);
     const double speed = descend(model, context.world.gravity, context.dt, work.points, state, work.descent);
-    keep_forces(context.world, model.rest, work, state);
+    keep_forces(context);
     if (context.motion.forces_wanted) bearing_forces(model, work.points, state, work.descent, state.forces);
     return speed;
   }
@@ -152,7 +160,9 @@ double integrate_elements(StepContext& context) {
     press_coarser(model, work.points, state);
     follow_coarser(model, context.dt, state);
   }
-  state.stiffening = stiffening(model.rest, model.tetrahedra_at, work.points, state.positions);
+  if (context.substep == context.substeps) {  // the next step asks for it
+    state.stiffening = stiffening(model.rest, model.tetrahedra_at, work.points, state.positions);
+  }
   return speed;
 }
 
@@ -191,10 +201,10 @@ Workspace build_workspace(const World& world) {
       prepare(work.penetrations[p], surface);
     }
     work.accelerations.assign(rest.positions.size(), Vector3::Zero());
+    if (rest.elastic()) work.pressing_of.assign(count_memories(world, rest), -1);
     const std::size_t places = world.pieces.size() * count_places(rest);
     if (model.integrator == Integrator::vertex_block_descent) {
       prepare(work.descent, rest);
-      work.force_of.assign(count_memories(world, rest), 0.0);
     } else {
       prepare(work.elements, rest);
       prepare(work.levels, model);
@@ -394,7 +404,10 @@ void deform(StepContext& context) {
 
 void bear(StepContext& context) {
   OrganWorkspace& work = context.work();
-  if (work.points.empty()) return;
+  if (work.points.empty()) {
+    context.state.pressing.clear();
+    return;
+  }
   const Lap lap(context.report.profile.response);
   const RestShape& rest = context.model().rest;
   if (!context.motion.forces_wanted) {
@@ -402,6 +415,7 @@ void bear(StepContext& context) {
   } else if (rest.elastic()) {
     bear_forces(rest.inverse_mass, context.state.forces, work.accelerations, work.points);
   }
+  if (rest.elastic() && context.model().integrator == Integrator::explicit_substeps) keep_forces(context);
   for (const ContactPoint& point : work.points) record_contact(context, point);
 }
 

@@ -20,15 +20,21 @@ RegionModel build_region_model(const RestShape& shape, double radius, double edg
 /// What a vertex has to do with a region.
 enum class Part : char { asleep, driven, free };
 
+/// A free vertex that a spring pulls towards the coarser level.
+struct BandVertex {
+  int vertex = 0;
+  double reach = 0.0;                  ///< 0 where the band begins, 1 at the radius
+  Vector3 target = Vector3::Zero();    ///< m, where the coarser level would have it
+  Vector3 velocity = Vector3::Zero();  ///< m/s, of the target
+};
+
 /// The part of a level that is simulated now; the rest follows the next coarser level.
 struct ActiveRegion {
-  std::vector<int> batches;     ///< of tetrahedra: those with a free vertex
-  std::vector<int> free;        ///< vertices that are integrated
-  std::vector<int> driven;      ///< the other vertices of the batches: they follow the coarser level
-  std::vector<int> band;        ///< into `free`: those that a spring pulls towards the coarser level
-  std::vector<double> reach;    ///< per entry of `band`: 0 where it begins, 1 at the radius
-  std::vector<Vector3> target;  ///< m, per entry of `band`: where the coarser level would have it
-  std::vector<Part> mark;       ///< per vertex
+  std::vector<int> batches;      ///< of tetrahedra: those with a free vertex
+  std::vector<int> free;         ///< vertices that are integrated
+  std::vector<int> driven;       ///< the other vertices of the batches: they follow the coarser level
+  std::vector<BandVertex> band;  ///< the outermost of the free ones
+  std::vector<Part> mark;        ///< per vertex
 };
 
 /// Room for recentre(), one entry a vertex or batch.

@@ -9,10 +9,11 @@
 
 namespace tissue_sim {
 
-/// The force (N) that vertex block descent found at a place of contact in the last substep.
+/// What was found at a place of contact in the last substep: the next one starts from it.
 struct PlaceForce {
   std::size_t place = 0;
-  double force = 0.0;
+  double force = 0.0;     ///< N, that the tissue bears there
+  double stopping = 0.0;  ///< N, impulse over dt of the explicit integrator
 };
 
 /// What a step changes of a coarser level.
@@ -35,7 +36,7 @@ struct OrganState {
   std::vector<std::vector<char>> colliding;   ///< per piece, one a vertex: the paper's memory; empty for the flood
   std::vector<std::vector<int>> touching;     ///< per piece: vertices that were in contact in the last substep
   std::vector<Clearance> clearances;          ///< per piece
-  std::vector<PlaceForce> pressing;           ///< vertex block descent starts from them
+  std::vector<PlaceForce> pressing;           ///< what the contacts of the last substep bore
   double stiffening = 0.0;                    ///< of an explicit solid in the last substep; see stiffening()
   ActiveRegion region;                        ///< of the organ's own tetrahedra, with levels
   std::vector<LevelState> levels;             ///< the coarser ones, the finest first

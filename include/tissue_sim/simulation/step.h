@@ -36,7 +36,7 @@ struct OrganWorkspace {
   ElementRoom elements;
   LevelsRoom levels;
   std::vector<Vector3> accelerations;
-  std::vector<double> force_of;  ///< N, per place; 0 between two uses
+  std::vector<int> pressing_of;  ///< per place, into the state's pressing; -1 between two uses
   DescentRoom descent;
   OrganState last_good;
 
