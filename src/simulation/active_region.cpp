@@ -56,7 +56,7 @@ void recentre(const RegionModel& model, const RestShape& shape, const std::vecto
   for (const int v : region.driven) region.mark[v] = Part::asleep;
   std::vector<int>& before = room.fallen;  // becomes those of them that are not free again
   before.swap(region.free);
-  region.batches.clear();
+  region.active.tetrahedra.clear();
   region.driven.clear();
   region.free.clear();
   for (const std::vector<Vector3>& of_piece : centres) {
@@ -74,10 +74,10 @@ void recentre(const RegionModel& model, const RestShape& shape, const std::vecto
         }
         awake = awake || room.distance[*v] < model.radius;
       }
-      if (awake) region.batches.push_back(batch);
+      if (awake) region.active.tetrahedra.push_back(batch);
     });
   }
-  for (const int batch : region.batches) {
+  for (const int batch : region.active.tetrahedra) {
     for (const int* v = model.vertices.begin(batch); v != model.vertices.end(batch); ++v) {
       if (room.vertex_stamp[*v] == 0) continue;
       room.vertex_stamp[*v] = 0;  // listed
@@ -105,6 +105,8 @@ void recentre(const RegionModel& model, const RestShape& shape, const std::vecto
   }
   before.resize(fallen);
   for (const int v : region.driven) region.mark[v] = Part::driven;
+  region.active.vertices = region.free;
+  region.active.vertices.insert(region.active.vertices.end(), region.driven.begin(), region.driven.end());
 }
 
 }  // namespace tissue_sim

@@ -1,7 +1,9 @@
 #include "tissue_sim/simulation/integrator.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstring>
 
 namespace tissue_sim {
 
@@ -20,25 +22,137 @@ constexpr double solid_stiffening = 0.7;
 /// Beyond four times the substeps it is a matter of the health check.
 constexpr double most_stiffening = 16.0;
 
+// Vectors of three doubles go through registers four at a time: one by one the vertices took as long as a fifth of the
+// elements.
+using FourDoubles = double __attribute__((vector_size(32)));
+using FourFloats = float __attribute__((vector_size(16)));
+
+/// x, y, z of a vertex, and something.
+__attribute__((always_inline)) inline void read(const std::vector<Vector3>& vectors, std::size_t v, FourDoubles& four) {
+  if (v + 1 < vectors.size()) {
+    std::memcpy(&four, vectors[v].data(), sizeof four);  // with the x of the next one
+  } else {
+    four = FourDoubles{vectors[v].x(), vectors[v].y(), vectors[v].z(), 0.0};
+  }
+}
+
+__attribute__((always_inline)) inline void read_motion(const RestShape& rest, const Moving& moving, std::size_t v,
+                                                       FourDoubles& displacement, FourDoubles& velocity) {
+  FourDoubles origin;
+  read(rest.positions, v, origin);
+  read(moving.positions, v, displacement);
+  displacement -= origin;
+  read(moving.velocities, v, velocity);
+}
+
+__attribute__((always_inline)) inline void write(const FourDoubles& four, Vector3& vector) {
+  std::memcpy(vector.data(), &four, sizeof vector);
+}
+
+/// All vertices, or those of a list.
+struct EveryVertex {
+  std::size_t count;
+  std::size_t operator[](std::size_t i) const { return i; }
+  std::size_t size() const { return count; }
+};
+struct SomeVertices {
+  const std::vector<int>& list;
+  std::size_t operator[](std::size_t i) const { return static_cast<std::size_t>(list[i]); }
+  std::size_t size() const { return list.size(); }
+};
+
 /// Forces of neo-Hookean tetrahedra, damped by evaluating them where the vertices will be after damping_time.
-void tetrahedra_forces(const RestShape& rest, const OrganState& state, ElementRoom& room,
-                       std::vector<Vector3>& forces) {
-  for (std::size_t v = 0; v < forces.size(); ++v) {
-    const Vector3 displacement = state.positions[v] - rest.positions[v] + rest.damping_time * state.velocities[v];
-    room.displacements[v] << displacement.cast<float>(), 0.0F;
+template <class Vertices, class Add>
+void tetrahedra_forces(const RestShape& rest, const Moving& moving, const Vertices& vertices, const Add& add,
+                       ElementRoom& room, std::vector<Vector3>& forces) {
+  FourDoubles displacement, velocity, whole, speed_of_whole;
+  read_motion(rest, moving, room.reference, whole, speed_of_whole);
+  whole += rest.damping_time * speed_of_whole;
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    const std::size_t v = vertices[i];
+    read_motion(rest, moving, v, displacement, velocity);
+    const FourFloats moved = __builtin_convertvector(displacement + rest.damping_time * velocity - whole, FourFloats);
+    std::memcpy(room.displacements[v].data(), &moved, sizeof moved);
     room.forces[v].setZero();
   }
-  add_neo_hookean_forces(rest.packed, room.displacements.front().data(), room.forces.front().data());
-  for (std::size_t v = 0; v < forces.size(); ++v) forces[v] = room.forces[v].head<3>().cast<double>();
+  add(room.displacements.front().data(), room.forces.front().data());
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    const std::size_t v = vertices[i];
+    FourFloats force;
+    std::memcpy(&force, room.forces[v].data(), sizeof force);
+    write(__builtin_convertvector(force, FourDoubles), forces[v]);
+  }
+}
+
+/// How hard the enclosed volume pulls on its gradient by the vertices' normals, N/m^2. Its change is summed in double,
+/// lane by lane: of a million triangles' shares a float would keep no digit of a small one.
+double enclosed_pull(const EnclosedVolume& enclosed, const std::vector<EnclosedShare>& shares) {
+  if (!(enclosed.stiffness > 0.0)) return 0.0;
+  std::array<double, constraint_lanes> changes{};
+  std::array<double, constraint_lanes> rates{};
+  for (const EnclosedShare& share : shares) {
+    for (std::size_t l = 0; l < constraint_lanes; ++l) changes[l] += static_cast<double>(share.change[l]);
+    for (std::size_t l = 0; l < constraint_lanes; ++l) rates[l] += static_cast<double>(share.rate[l]);
+  }
+  double change = 0.0;
+  double rate = 0.0;
+  for (const double c : changes) change += c;
+  for (const double r : rates) rate += r;
+  const double sixth = 1.0 / (6.0 * enclosed.rest);
+  return sixth * sixth * (enclosed.stiffness * change + enclosed.damping * rate);
+}
+
+/// Forces of distance, area and volume elements and the enclosed volume.
+template <class Vertices, class Add>
+void constraint_forces(const RestShape& rest, const Moving& moving, const Vertices& vertices, const Add& add,
+                       ElementRoom& room, std::vector<Vector3>& forces) {
+  FourDoubles displacement, velocity, whole, speed_of_whole;
+  read_motion(rest, moving, room.reference, whole, speed_of_whole);
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    const std::size_t v = vertices[i];
+    read_motion(rest, moving, v, displacement, velocity);
+    VertexMotion& motion = room.motions[v];
+    FourFloats moved = __builtin_convertvector(displacement - whole, FourFloats);
+    moved[3] = motion.inverse_mass;
+    const FourFloats speed = __builtin_convertvector(velocity - speed_of_whole, FourFloats);
+    std::memcpy(motion.displacement.data(), &moved, sizeof moved);
+    std::memcpy(motion.velocity.data(), &speed, sizeof speed);
+    room.pulls[v] = VertexPull();
+  }
+  add(room.motions.data(), room.pulls.data(), room.shares.data());
+  const double pull = enclosed_pull(rest.enclosed, room.shares);
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    const std::size_t v = vertices[i];
+    FourFloats force, normal;
+    std::memcpy(&force, room.pulls[v].force.data(), sizeof force);
+    std::memcpy(&normal, room.pulls[v].normal.data(), sizeof normal);
+    write(__builtin_convertvector(force, FourDoubles) - pull * __builtin_convertvector(normal, FourDoubles), forces[v]);
+  }
 }
 
 }  // namespace
 
+void pack_elements(RestShape& rest) {
+  const bool surface = !rest.areas.empty() || rest.enclosed.stiffness > 0.0;
+  rest.packed = pack(rest.tetrahedra);
+  rest.constraints = pack(rest.distances, rest.areas, rest.volumes, surface ? rest.triangles : std::vector<Triangle>(),
+                          rest.positions, {rest.inverse_mass, covered_stiffening * rest.stiffest_element});
+}
+
 void prepare(ElementRoom& room, const RestShape& rest) {
-  if (rest.enclosed.stiffness > 0.0) room.gradient.assign(rest.positions.size(), Vector3::Zero());
-  if (rest.packed.batches.empty()) return;
-  room.displacements.assign(rest.positions.size(), Eigen::Vector4f::Zero());
-  room.forces = room.displacements;
+  const std::size_t vertices = rest.positions.size();
+  const auto attached = std::find(rest.attached.begin(), rest.attached.end(), 1);
+  room.reference = attached != rest.attached.end() ? static_cast<std::size_t>(attached - rest.attached.begin())
+                                                   : static_cast<std::size_t>(rest.first_simulated);
+  if (!rest.packed.batches.empty()) {
+    room.displacements.assign(vertices, Eigen::Vector4f::Zero());
+    room.forces = room.displacements;
+  }
+  if (rest.constraints.empty()) return;
+  room.motions.assign(vertices, VertexMotion());
+  for (std::size_t v = 0; v < vertices; ++v) room.motions[v].inverse_mass = static_cast<float>(rest.inverse_mass[v]);
+  room.pulls.assign(vertices, VertexPull());
+  room.shares.assign(rest.constraints.shares(), EnclosedShare());
 }
 
 int substeps_for(const RestShape& rest, double duration, double stiffening) {
@@ -66,41 +180,35 @@ double stiffening(const RestShape& rest, const FlatLists& tetrahedra_at, const s
   return stiffest / rest.stiffest_element;
 }
 
-void element_forces(const RestShape& rest, const OrganState& state, std::vector<Vector3>& forces, ElementRoom& room) {
+void element_forces(const RestShape& rest, const Moving& moving, std::vector<Vector3>& forces, ElementRoom& room) {
+  const EveryVertex vertices = {forces.size()};
   if (!rest.packed.batches.empty()) {
-    tetrahedra_forces(rest, state, room, forces);
+    const auto add = [&](const float* displacements, float* sums) {
+      add_neo_hookean_forces(rest.packed, displacements, sums);
+    };
+    tetrahedra_forces(rest, moving, vertices, add, room, forces);
     return;
   }
-  std::fill(forces.begin(), forces.end(), Vector3::Zero());
-  const StiffnessLimit limit = {rest.inverse_mass, covered_stiffening * rest.stiffest_element};
-  for (const DistanceElement& element : rest.distances) {
-    add_forces(element, limit, state.positions, state.velocities, forces);
-  }
-  for (const AreaElement& element : rest.areas) {
-    add_forces(element, limit, state.positions, state.velocities, forces);
-  }
-  for (const VolumeElement& element : rest.volumes) {
-    add_forces(element, limit, state.positions, state.velocities, forces);
-  }
-  if (!(rest.enclosed.stiffness > 0.0)) return;
-
-  const double c = rest.enclosed.evaluate(state.positions, rest.triangles, room.gradient);
-  double rate = 0.0;
-  for (std::size_t v = 0; v < forces.size(); ++v) rate += room.gradient[v].dot(state.velocities[v]);
-  const double pull = rest.enclosed.stiffness * c + rest.enclosed.damping * rate;
-  for (std::size_t v = 0; v < forces.size(); ++v) forces[v] -= pull * room.gradient[v];
+  const auto add = [&](const VertexMotion* motions, VertexPull* pulls, EnclosedShare* shares) {
+    add_constraint_forces(rest.constraints, motions, pulls, shares);
+  };
+  constraint_forces(rest, moving, vertices, add, room, forces);
 }
 
-void region_forces(const RestShape& rest, const std::vector<Vector3>& positions, const std::vector<Vector3>& velocities,
-                   const ActiveRegion& region, ElementRoom& room) {
-  for (const std::vector<int>* vertices : {&region.free, &region.driven}) {
-    for (const int v : *vertices) {
-      const Vector3 displacement = positions[v] - rest.positions[v] + rest.damping_time * velocities[v];
-      room.displacements[v] << displacement.cast<float>(), 0.0F;
-      room.forces[v].setZero();
-    }
+void element_forces(const RestShape& rest, const Moving& moving, const ActiveElements& active,
+                    std::vector<Vector3>& forces, ElementRoom& room) {
+  const SomeVertices vertices = {active.vertices};
+  if (!rest.packed.batches.empty()) {
+    const auto add = [&](const float* displacements, float* sums) {
+      add_neo_hookean_forces(rest.packed, active.tetrahedra, displacements, sums);
+    };
+    tetrahedra_forces(rest, moving, vertices, add, room, forces);
+    return;
   }
-  add_neo_hookean_forces(rest.packed, region.batches, room.displacements.front().data(), room.forces.front().data());
+  const auto add = [&](const VertexMotion* motions, VertexPull* pulls, EnclosedShare* shares) {
+    add_constraint_forces(rest.constraints, active.constraints, motions, pulls, shares);
+  };
+  constraint_forces(rest, moving, vertices, add, room, forces);
 }
 
 namespace {

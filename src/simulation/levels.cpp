@@ -142,7 +142,7 @@ double move_level(const OrganModel& model, std::size_t level, const Vector3& gra
                   ElementRoom& room) {
   const LevelView at = view(model, level, state);
   LevelState& own = state.levels[level - 1];
-  region_forces(at.shape, at.positions, at.velocities, at.region, room);
+  element_forces(at.shape, {at.positions, at.velocities}, at.region.active, own.forces, room);
   const double slowed = 1.0 / (1.0 + dt * model.drag);
   double fastest = 0.0;
   const double stiffness = model.shear_modulus * edge_of(model, level);
@@ -151,9 +151,8 @@ double move_level(const OrganModel& model, std::size_t level, const Vector3& gra
     own.push[band.vertex] += dt * k * (band.target - at.positions[band.vertex]);
   }
   for (const int v : at.region.free) {
-    const Vector3 force = room.forces[v].head<3>().cast<double>();
     at.velocities[v] =
-        slowed * (at.velocities[v] + at.shape.inverse_mass[v] * (dt * force + own.push[v]) + dt * gravity);
+        slowed * (at.velocities[v] + at.shape.inverse_mass[v] * (dt * own.forces[v] + own.push[v]) + dt * gravity);
     own.push[v].setZero();
   }
   hold_pins(model.levels[level - 1], dt, at);
@@ -184,14 +183,16 @@ void rest_levels(const OrganModel& model, std::size_t pieces, OrganState& state)
     at.positions = level.shape.positions;
     at.velocities.assign(at.positions.size(), Vector3::Zero());
     at.push = at.velocities;
+    at.forces = at.velocities;
     at.region.mark.assign(at.positions.size(), Part::asleep);
   }
   // The coarsest is always awake.
   ActiveRegion& coarsest = state.levels.back().region;
   std::fill(coarsest.mark.begin(), coarsest.mark.end(), Part::free);
   for (std::size_t v = 0; v < coarsest.mark.size(); ++v) coarsest.free.push_back(static_cast<int>(v));
+  coarsest.active.vertices = coarsest.free;
   for (std::size_t b = 0; b < model.levels.back().shape.packed.batches.size(); ++b) {
-    coarsest.batches.push_back(static_cast<int>(b));
+    coarsest.active.tetrahedra.push_back(static_cast<int>(b));
   }
 }
 

@@ -149,8 +149,7 @@ double integrate_elements(StepContext& context) {
   } else {
     coarser_speed =
         move_coarser(model, context.world.gravity, context.substep, context.substeps, context.dt, state, work.levels);
-    region_forces(model.rest, state.positions, state.velocities, state.region, work.elements);
-    for (const int v : state.region.free) state.forces[v] = work.elements.forces[v].head<3>().cast<double>();
+    element_forces(model.rest, state, state.region.active, state.forces, work.elements);
     add_band_forces(model, context.dt, state);
   }
   accelerate(model, context.world.gravity, context.dt, state.forces, state);

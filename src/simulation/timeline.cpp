@@ -39,7 +39,8 @@ std::size_t bytes(const RestShape& rest) {
          bytes(rest.topology.edges) + bytes(rest.topology.edge_triangles) + bytes(rest.topology.triangle_edges) +
          bytes(rest.topology.vertex_edges) + bytes(rest.topology.vertex_triangles) + bytes(rest.attached) +
          bytes(rest.mass) + bytes(rest.inverse_mass) + bytes(rest.distances) + bytes(rest.areas) + bytes(rest.volumes) +
-         bytes(rest.tetrahedra) + bytes(rest.packed.batches);
+         bytes(rest.tetrahedra) + bytes(rest.packed.batches) + bytes(rest.constraints.pairs) +
+         bytes(rest.constraints.flaps) + bytes(rest.constraints.triangles) + bytes(rest.constraints.distances);
 }
 
 std::size_t bytes(const OrganState& state) {

@@ -107,7 +107,7 @@ World build_world(const Scene& scene) {
       model.incidence = build_incidence(model.rest);
     } else {
       refuse_if_too_stiff(scene, organ, model.rest);
-      model.rest.packed = pack(model.rest.tetrahedra);
+      pack_elements(model.rest);
       if (!model.rest.tetrahedra.empty()) {
         model.tetrahedra_at = corners_of(model.rest.tetrahedra, model.rest.positions.size());
         for (int& corner : model.tetrahedra_at.items) corner /= 4;

@@ -15,7 +15,8 @@ constexpr const char* usage =
     "usage: tissue_sim_bench paper|elements [--accuracy] [--json FILE]\n"
     "  paper             Table 1 of the paper: 9 pairs of spheres, 3 approaches, milliseconds a collision step\n"
     "  paper --accuracy  its depths, directions and colliding vertices against exact ones\n"
-    "  elements          ns a tetrahedron: the forces of a substep, or a sweep of vertex block descent\n"
+    "  elements          ns a tetrahedron: the forces of a substep, or a sweep of vertex block descent; the\n"
+    "                    elements of a substep against one by one and against what the machine can do\n"
     "  --json FILE       write the rows to FILE\n";
 
 struct Arguments {
@@ -124,6 +125,28 @@ JsonRows bench_accuracy() {
   return json;
 }
 
+/// The elements of an explicit substep against one by one, and against the machine.
+void bench_substeps(JsonRows& json) {
+  const MachineLimit limit = measure_machine();
+  std::printf("\nOne explicit substep. This core: %.1f GB/s from memory, %.1f from cache, %.1f Gflop/s\n\n",
+              1e-9 * limit.bytes_per_second, 1e-9 * limit.cached_bytes_per_second, 1e-9 * limit.operations_per_second);
+  std::printf("model    elements      ms  ns an element  one by one  ratio  kB moved  kflop  of the machine's limit\n");
+  for (const SubstepCost& cost : time_substeps()) {
+    const double ns = 1e9 * cost.seconds / cost.elements;
+    const double plain_ns = 1e9 * cost.plain_seconds / cost.elements;
+    const double of_limit = cost.seconds / least_possible(cost, limit);
+    std::printf("%-7s  %8d  %6.3f  %13.2f  %10.1f  %5.1f  %8.0f  %5.0f  %.2f times\n", cost.organ, cost.elements,
+                1e3 * cost.seconds, ns, plain_ns, plain_ns / ns, 1e-3 * cost.bytes, 1e-3 * cost.operations, of_limit);
+    json.add(
+        text("\"measure\": \"substep\", \"model\": \"%s\", \"elements\": %d, \"ms\": %.6g, \"ns_per_element\": "
+             "%.6g, \"plain_ns_per_element\": %.6g, \"bytes\": %.6g, \"operations\": %.6g, \"memory_gb_s\": %.6g, "
+             "\"cache_gb_s\": %.6g, \"gflop_s\": %.6g, \"times_the_limit\": %.6g",
+             cost.organ, cost.elements, 1e3 * cost.seconds, ns, plain_ns, cost.bytes, cost.operations,
+             1e-9 * limit.bytes_per_second, 1e-9 * limit.cached_bytes_per_second, 1e-9 * limit.operations_per_second,
+             of_limit));
+  }
+}
+
 JsonRows bench_elements() {
   JsonRows json;
   std::printf("A block of cut cubes, one core, registers: %s\n\n", name(instruction_set()));
@@ -134,6 +157,7 @@ JsonRows bench_elements() {
     json.add(text("\"model\": \"%s\", \"integrator\": \"%s\", \"tetrahedra\": %d, \"ns_per_tetrahedron\": %.6g",
                   to_string(cost.model), to_string(cost.integrator), cost.tetrahedra, ns));
   }
+  bench_substeps(json);
   return json;
 }
 

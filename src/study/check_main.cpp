@@ -59,7 +59,8 @@ double time_passes(Pass pass) {
 }
 
 /// The elements of one kind alone, as the explicit integrator has them: s a substep.
-double time_elements(const RestShape& rest) {
+double time_elements(RestShape rest) {
+  pack_elements(rest);
   OrganState state;
   state.positions = rest.positions;
   state.velocities.assign(rest.positions.size(), Vector3::Zero());
@@ -92,8 +93,8 @@ void print_features(const Organ& organ, const OrganSummary& summary) {
   none.tetrahedra.clear();
   none.enclosed.stiffness = 0.0;
   RestShape alone = none;
-  alone.packed = pack(rest.tetrahedra);
-  const std::size_t packed = bytes(alone.packed.batches);
+  alone.tetrahedra = rest.tetrahedra;
+  const std::size_t packed = sizeof(NeoHookeanBatch) / NeoHookeanBatch::lanes * rest.tetrahedra.size();
   row("tetrahedra", organ.model == Model::volume
                         ? text("on: %d, as distance and volume elements", summary.tetrahedra)
                         : elements_text(rest.tetrahedra.size(), bytes(rest.tetrahedra) + packed, summary, alone));

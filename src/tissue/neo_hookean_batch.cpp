@@ -207,7 +207,7 @@ void add_chosen(const NeoHookeanSolid& solid, const Chosen& chosen, const float*
   }
 #ifdef __x86_64__
   const TinyIsZero tiny_is_zero;
-  if (set == InstructionSet::avx2) return add_forces_avx2(solid, chosen, displacements, forces);
+  if (set != InstructionSet::baseline) return add_forces_avx2(solid, chosen, displacements, forces);
 #endif
   add_forces_baseline(solid, chosen, displacements, forces);
 }
@@ -237,18 +237,23 @@ NeoHookeanSolid pack(const std::vector<NeoHookeanElement>& elements) {
 bool available(InstructionSet set) {
 #ifdef __x86_64__
   if (set == InstructionSet::avx2) return __builtin_cpu_supports("avx2") != 0;
+  if (set == InstructionSet::avx512) {
+    return available(InstructionSet::avx2) && __builtin_cpu_supports("avx512f") != 0 &&
+           __builtin_cpu_supports("avx512vl") != 0;
+  }
 #endif
   return set == InstructionSet::baseline;
 }
 
 InstructionSet instruction_set() {
-  static const InstructionSet fastest =
-      available(InstructionSet::avx2) ? InstructionSet::avx2 : InstructionSet::baseline;
+  static const InstructionSet fastest = available(InstructionSet::avx512) ? InstructionSet::avx512
+                                        : available(InstructionSet::avx2) ? InstructionSet::avx2
+                                                                          : InstructionSet::baseline;
   return fastest;
 }
 
 const char* name(InstructionSet set) {
-  return set == InstructionSet::avx2 ? "avx2" : "baseline";
+  return set == InstructionSet::avx512 ? "avx512" : set == InstructionSet::avx2 ? "avx2" : "baseline";
 }
 
 void add_neo_hookean_forces(const NeoHookeanSolid& solid, const float* displacements, float* forces,

@@ -271,7 +271,7 @@ CornerSum corner_sum(InstructionSet set) {
     throw std::invalid_argument(std::string("corner_sum: this processor has no ") + name(set));
   }
 #ifdef __x86_64__
-  if (set == InstructionSet::avx2) return corner_sum_avx2;
+  if (set != InstructionSet::baseline) return corner_sum_avx2;
 #endif
   return corner_sum_baseline;
 }

@@ -189,7 +189,7 @@ TEST(NeoHookeanBatch, SameBitsWhateverThePadding) {
   std::vector<float> before;
   for (std::size_t i = 0; i < u.size(); ++i)
     before.push_back(i % 3 == 0 ? -0.0f : static_cast<float>(random_in(block.random, -1.0, 1.0)));
-  for (const InstructionSet set : {InstructionSet::baseline, InstructionSet::avx2}) {
+  for (const InstructionSet set : {InstructionSet::baseline, InstructionSet::avx2, InstructionSet::avx512}) {
     if (!available(set)) continue;
     std::vector<float> one_by_one = before;
     for (std::size_t n = 0; n <= 70; ++n) {
@@ -211,7 +211,7 @@ TEST(NeoHookeanBatch, SomeBatchesAreTheSameAsNoOthersThere) {
   const std::vector<float> u = block.displacements(0.3);
   std::vector<int> all;
   for (std::size_t b = 0; b < solid.batches.size(); ++b) all.push_back(static_cast<int>(b));
-  for (const InstructionSet set : {InstructionSet::baseline, InstructionSet::avx2}) {
+  for (const InstructionSet set : {InstructionSet::baseline, InstructionSet::avx2, InstructionSet::avx512}) {
     if (!available(set)) continue;
     std::vector<float> forces(u.size(), 0.0f);
     add_neo_hookean_forces(solid, all, u.data(), forces.data(), set);

@@ -172,7 +172,7 @@ TEST(NeoHookeanCorners, AnyNumberAroundAVertex) {
     }
     const Displacements u = tissue.displacements(0.2);
     const LocalStiffness expected = tissue.plain(u)[0];
-    for (const InstructionSet set : {InstructionSet::baseline, InstructionSet::avx2}) {
+    for (const InstructionSet set : {InstructionSet::baseline, InstructionSet::avx2, InstructionSet::avx512}) {
       if (!available(set)) continue;
       const LocalStiffness sum = tissue.fast(u, set)[0];
       EXPECT_LE((sum.gradient - expected.gradient).norm(), 1e-5 * expected.gradient.norm()) << n;

@@ -20,6 +20,13 @@ RegionModel build_region_model(const RestShape& shape, double radius, double edg
 /// What a vertex has to do with a region.
 enum class Part : char { asleep, driven, free };
 
+/// A part of an organ's batches.
+struct ActiveElements {
+  std::vector<int> vertices;        ///< all corners of the batches are among them
+  std::vector<int> tetrahedra;      ///< ascending, into RestShape::packed
+  ConstraintSelection constraints;  ///< into RestShape::constraints
+};
+
 /// A free vertex that a spring pulls towards the coarser level.
 struct BandVertex {
   int vertex = 0;
@@ -30,7 +37,7 @@ struct BandVertex {
 
 /// The part of a level that is simulated now; the rest follows the next coarser level.
 struct ActiveRegion {
-  std::vector<int> batches;      ///< of tetrahedra: those with a free vertex
+  ActiveElements active;         ///< those with a free vertex
   std::vector<int> free;         ///< vertices that are integrated
   std::vector<int> driven;       ///< the other vertices of the batches: they follow the coarser level
   std::vector<BandVertex> band;  ///< the outermost of the free ones

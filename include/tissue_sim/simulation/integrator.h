@@ -15,20 +15,38 @@ int substeps_for(const RestShape& rest, double duration, double stiffening = 0.0
 double stiffening(const RestShape& rest, const FlatLists& tetrahedra_at, const std::vector<ContactPoint>& points,
                   const std::vector<Vector3>& positions);
 
+/// Packs the elements into the batches that element_forces() computes.
+void pack_elements(RestShape& rest);
+
 /// Room for element_forces(), one entry a vertex; empty where the organ's elements need none.
 struct ElementRoom {
-  std::vector<Vector3> gradient;               ///< of the enclosed volume
+  /// The vertex whose motion is taken from all others': an attached one, or where none is, any. An organ that has
+  /// fallen far has no digits left for its strain in a float.
+  std::size_t reference = 0;
   std::vector<Eigen::Vector4f> displacements;  ///< m, of tetrahedra
   std::vector<Eigen::Vector4f> forces;         ///< N, of tetrahedra
+  std::vector<VertexMotion> motions;           ///< of the other elements
+  std::vector<VertexPull> pulls;
+  std::vector<EnclosedShare> shares;  ///< of the enclosed volume
 };
 void prepare(ElementRoom& room, const RestShape& rest);
 
-/// Writes the forces (N) of all elements, damping included, on all vertices.
-void element_forces(const RestShape& rest, const OrganState& state, std::vector<Vector3>& forces, ElementRoom& room);
+/// Where the vertices of an organ or of a level are, m, and how fast, m/s.
+struct Moving {
+  const std::vector<Vector3>& positions;
+  const std::vector<Vector3>& velocities;
 
-/// Writes into `room` the forces (N) of the awake batches of tetrahedra on the free vertices of a region.
-void region_forces(const RestShape& rest, const std::vector<Vector3>& positions, const std::vector<Vector3>& velocities,
-                   const ActiveRegion& region, ElementRoom& room);
+  Moving(const std::vector<Vector3>& x, const std::vector<Vector3>& v) : positions(x), velocities(v) {}
+  Moving(const OrganState& organ) : positions(organ.positions), velocities(organ.velocities) {}
+};
+
+/// Writes the forces (N) of all elements, damping included, on all vertices.
+void element_forces(const RestShape& rest, const Moving& moving, std::vector<Vector3>& forces, ElementRoom& room);
+
+/// The same for a part: writes the forces of its elements on its vertices, and leaves those on others. What the rest
+/// of the surface adds to the enclosed volume is what it added when it was last computed.
+void element_forces(const RestShape& rest, const Moving& moving, const ActiveElements& active,
+                    std::vector<Vector3>& forces, ElementRoom& room);
 
 /// The first half of an explicit (symplectic) substep of dt (s): v += dt (f/m + g), slowed by the drag. Attached and
 /// held vertices stay.

@@ -5,6 +5,7 @@
 #include "tissue_sim/geometry/embedding.h"
 #include "tissue_sim/scene/scene.h"
 #include "tissue_sim/tissue/area.h"
+#include "tissue_sim/tissue/constraint_batch.h"
 #include "tissue_sim/tissue/distance.h"
 #include "tissue_sim/tissue/enclosed_volume.h"
 #include "tissue_sim/tissue/neo_hookean_batch.h"
@@ -38,6 +39,7 @@ struct RestShape {
   std::vector<VolumeElement> volumes;         ///< flaps of a wall, tetrahedra of a solid
   std::vector<NeoHookeanElement> tetrahedra;  ///< `fem`
   NeoHookeanSolid packed;                     ///< the same tetrahedra for the explicit integrator, else empty
+  ConstraintBatches constraints;              ///< the same distances, areas and volumes, likewise
   EnclosedVolume enclosed;
   double stiffness_correction = 1.0;  ///< of `volume`, from a patch test on the organ's own mesh
   double damping_time = 0.0;  ///< s, of the tetrahedra: their forces are those of positions + damping_time velocities
