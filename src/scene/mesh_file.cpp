@@ -188,7 +188,10 @@ TriangleMesh read_mesh(const std::string& path, const Vector3& scale) {
 }
 
 TriangleMesh load_organ_mesh(const std::string& path, double scale, std::vector<std::string>& warnings) {
-  TriangleMesh mesh = read_mesh(path, Vector3::Constant(scale));
+  return mend_organ_mesh(path, read_mesh(path, Vector3::Constant(scale)), warnings);
+}
+
+TriangleMesh mend_organ_mesh(const std::string& path, TriangleMesh mesh, std::vector<std::string>& warnings) {
   const MeshFaults faults = mend(path, mesh, warnings);
   if (!faults.closed_manifold()) fail(path, list_faults(faults) + ": " + cure_of(faults));
   const double size = size_of(mesh);
