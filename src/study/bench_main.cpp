@@ -1,5 +1,8 @@
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <string>
 
 #include "tissue_sim/study/element_bench.h"
@@ -13,11 +16,12 @@ namespace {
 using namespace tissue_sim;
 
 constexpr const char* usage =
-    "usage: tissue_sim_bench paper|elements|load [--accuracy] [--json FILE]\n"
+    "usage: tissue_sim_bench paper|elements|load|frame [--accuracy] [--json FILE]\n"
     "  paper             Table 1 of the paper: 9 pairs of spheres, 3 approaches, milliseconds a collision step\n"
     "  paper --accuracy  its depths, directions and colliding vertices against exact ones\n"
     "  elements          ns a tetrahedron: the forces of a substep, or a sweep of vertex block descent\n"
     "  load              an organ of 100,000 and one of 1,000,000 triangles, from the file to the first step\n"
+    "  frame             from pose to published state through ROS; frame --help for what it takes\n"
     "  --json FILE       write the rows to FILE\n";
 
 struct Arguments {
@@ -170,9 +174,19 @@ bool write_json(const std::string& path, const Arguments& arguments, const JsonR
   return std::fclose(file) == 0;
 }
 
+/// The part that speaks ROS is a program of its own beside this one.
+int run_frame(char** argv) {
+  const std::string program =
+      (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "tissue_sim_bench_frame").string();
+  execv(program.c_str(), argv + 1);
+  std::fprintf(stderr, "%s: cannot be run, it belongs to the package: build and install all of it\n", program.c_str());
+  return 1;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (argc > 1 && std::string(argv[1]) == "frame") return run_frame(argv);
   if (argc == 2 && std::string(argv[1]) == "--help") {
     std::fputs(usage, stdout);
     return 0;
