@@ -112,12 +112,23 @@ bool is_degenerate(const Vector3& a, const Vector3& b, const Vector3& c) {
   return area_normal(a, b, c).norm() <= degenerate_ratio * longest2;
 }
 
-int count_duplicates(const std::vector<Triangle>& triangles) {
-  std::vector<Triangle> sorted = triangles;
-  for (Triangle& t : sorted) std::sort(t.begin(), t.end());
-  std::sort(sorted.begin(), sorted.end());
+/// Triangles with the same corners meet at their smallest vertex: few are sorted at a time.
+int count_duplicates(int vertex_count, const std::vector<Triangle>& triangles) {
+  std::vector<std::array<int, 1>> smallest;
+  smallest.reserve(triangles.size());
+  for (const Triangle& t : triangles) smallest.push_back({std::min({t[0], t[1], t[2]})});
+  const FlatLists at = invert(vertex_count, smallest);
+  std::vector<Triangle> sorted;
   int duplicates = 0;
-  for (std::size_t i = 1; i < sorted.size(); ++i) duplicates += sorted[i] == sorted[i - 1];
+  for (int v = 0; v < vertex_count; ++v) {
+    sorted.clear();
+    for (const int* t = at.begin(v); t != at.end(v); ++t) {
+      sorted.push_back(triangles[*t]);
+      std::sort(sorted.back().begin(), sorted.back().end());
+    }
+    std::sort(sorted.begin(), sorted.end());
+    for (std::size_t i = 1; i < sorted.size(); ++i) duplicates += sorted[i] == sorted[i - 1];
+  }
   return duplicates;
 }
 
@@ -296,7 +307,7 @@ MeshFaults inspect(const TriangleMesh& mesh) {
       faults.components += surfaces.root(v) == v;
     }
   }
-  faults.duplicate_triangles = count_duplicates(sound);
+  faults.duplicate_triangles = count_duplicates(vertex_count, sound);
   faults.non_manifold_vertices = count_split_vertices(vertex_count, sound);
   for_each_edge(sort_half_edges(vertex_count, sound), [&](int, int, const HalfEdge* side, const HalfEdge* last) {
     const auto forward = [&](const HalfEdge& h) { return runs_low_to_high(sound[h.half / 3], h.half % 3); };
