@@ -16,6 +16,8 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -50,9 +52,10 @@ constexpr const char* usage =
 
 constexpr double fastest_rate = 1000.0;  // Hz
 constexpr double busy = 0.5;  // of the time between two poses that a step may take, so that a slow one is made up for
-constexpr int probing_contacts = 200;  // steps with contact that say how long a step takes
-constexpr double patience = 20.0;      // s for a program to start
-constexpr double drain = 3.0;          // s without an answer, after the last pose
+constexpr int probing_contacts = 200;                  // steps with contact that say how long a step takes
+constexpr double patience = 20.0;                      // s for a program to start
+constexpr std::int64_t after_motion = 60'000'000'000;  // ns: stamps this much later are no part of the motion
+constexpr double drain = 3.0;                          // s without an answer, after the last pose
 
 struct Arguments {
   std::string scene = "package://tissue_sim/config/scenes/demo.yaml";
@@ -268,7 +271,8 @@ struct Output {
   ros::Subscriber subscriber;
   std::vector<Clock::time_point> arrival;  ///< zero: not received
   std::size_t received = 0;
-  std::size_t strangers = 0;  ///< stamps that no pose has
+  std::size_t strangers = 0;         ///< stamps that no pose has
+  std::atomic<bool> greeted{false};  ///< a message came for a pose that is later than the motion
 };
 
 /// The client: publishes poses, listens.
@@ -277,7 +281,6 @@ class Client {
   Client(const Scene& scene, const std::vector<StampedPose>& motion, const std::string& space)
       : scene_(scene), motion_(motion), node_(space), sent_(motion.size()) {
     node_.setCallbackQueue(&queue_);
-    outputs_.resize(3);
     listen<TissueState>(outputs_[0], "tissue_sim/" + scene.organs[0].name + "/state");
     listen<Contacts>(outputs_[1], "tissue_sim/contacts");
     listen<geometry_msgs::WrenchStamped>(outputs_[2], "tissue_sim/" + scene.instruments[0].name + "/measured_cf");
@@ -289,40 +292,32 @@ class Client {
     poses_ = node_.advertise<geometry_msgs::PoseStamped>(topic, 100);
   }
 
-  bool connected() const {
-    return poses_.getNumSubscribers() > 0 && std::all_of(outputs_.begin(), outputs_.end(), [](const Output& output) {
-             return output.subscriber.getNumPublishers() > 0;
-           });
+  /// Publishes a pose, standing where the motion starts and later than all of it, and waits a moment. True once all
+  /// outputs have answered such a pose: no connection is still being made then, on either side. The motion that follows
+  /// is a new run for the node, from rest, since its stamps are earlier.
+  bool greet() {
+    publish({motion_.back().stamp + after_motion + greetings_++ * std::llround(1e9 * scene_.time_step),
+             motion_.front().pose});
+    queue_.callAvailable(ros::WallDuration(0.01));
+    return std::all_of(outputs_.begin(), outputs_.end(), [](const Output& output) { return output.greeted.load(); });
   }
 
   /// Publishes all poses and waits for what comes back.
   void run(double rate, Child& node) {
     ros::AsyncSpinner spinner(1, &queue_);
     spinner.start();
-    std::this_thread::sleep_for(std::chrono::seconds(1));  // both sides have said yes to all connections
-    geometry_msgs::PoseStamped message;
-    message.header.frame_id = scene_.frame;
     Pace pace(rate);
     for (std::size_t i = 0; i < motion_.size() && node.running() && ros::ok(); ++i) {
-      const Pose& pose = motion_[i].pose;
-      message.header.stamp = to_ros_time(motion_[i].stamp);
-      message.pose.position.x = pose.position.x();
-      message.pose.position.y = pose.position.y();
-      message.pose.position.z = pose.position.z();
-      message.pose.orientation.x = pose.orientation.x();
-      message.pose.orientation.y = pose.orientation.y();
-      message.pose.orientation.z = pose.orientation.z();
-      message.pose.orientation.w = pose.orientation.w();
       pace.wait();
       sent_[i] = Clock::now();
-      poses_.publish(message);
+      publish(motion_[i]);
     }
     std::this_thread::sleep_for(std::chrono::duration<double>(drain));
     spinner.stop();
     if (!node.running()) throw std::runtime_error("tissue_sim_node has ended; its last lines say why");
   }
 
-  const std::vector<Output>& outputs() const { return outputs_; }
+  const std::array<Output, 3>& outputs() const { return outputs_; }
 
   /// Pose published to message received, s; one a pose, below zero where none came.
   std::vector<double> latencies(const Output& output) const {
@@ -338,6 +333,20 @@ class Client {
   double node_step() const { return node_steps_ > 0.0 ? node_ms_ / node_steps_ : 0.0; }
 
  private:
+  void publish(const StampedPose& pose) {
+    geometry_msgs::PoseStamped message;
+    message.header.frame_id = scene_.frame;
+    message.header.stamp = to_ros_time(pose.stamp);
+    message.pose.position.x = pose.pose.position.x();
+    message.pose.position.y = pose.pose.position.y();
+    message.pose.position.z = pose.pose.position.z();
+    message.pose.orientation.x = pose.pose.orientation.x();
+    message.pose.orientation.y = pose.pose.orientation.y();
+    message.pose.orientation.z = pose.pose.orientation.z();
+    message.pose.orientation.w = pose.pose.orientation.w();
+    poses_.publish(message);
+  }
+
   template <class Message>
   void listen(Output& output, const std::string& topic) {
     output.topic = topic.substr(topic.find('/') + 1);
@@ -347,6 +356,10 @@ class Client {
       const std::int64_t stamp = static_cast<std::int64_t>(message->header.stamp.toNSec());
       const auto pose = std::lower_bound(motion_.begin(), motion_.end(), stamp,
                                          [](const StampedPose& p, std::int64_t t) { return p.stamp < t; });
+      if (stamp >= motion_.back().stamp + after_motion) {
+        output.greeted = true;
+        return;
+      }
       if (pose == motion_.end() || pose->stamp != stamp) {
         ++output.strangers;
         return;
@@ -376,7 +389,8 @@ class Client {
   ros::Publisher poses_;
   ros::Subscriber diagnostics_;
   std::vector<Clock::time_point> sent_;
-  std::vector<Output> outputs_;
+  std::array<Output, 3> outputs_;
+  std::int64_t greetings_ = 0;
   double node_ms_ = 0.0, node_steps_ = 0.0;
 };
 
@@ -428,13 +442,22 @@ JsonRows report(const Client& client, const Steps& steps, double rate) {
   return json;
 }
 
+std::filesystem::path this_program() {
+  return std::filesystem::read_symlink("/proc/self/exe");
+}
+
+/// A path is relative to the folder that the user stands in; the package is found from where this program lies too.
+std::string file_of(const std::string& argument) {
+  const bool path = argument.find("://") == std::string::npos;
+  return resolve_path(argument, path ? std::filesystem::absolute("here").string() : this_program().string());
+}
+
 void bench(const Arguments& arguments, int argc, char** argv) {
-  const std::string scene_file = resolve_path(arguments.scene, std::filesystem::absolute("here").string());
+  const std::string scene_file = file_of(arguments.scene);
   std::vector<std::string> warnings;
   std::vector<ModelChoice> choices;
   const Scene scene = load_chosen_scene(scene_file, warnings, choices);
-  const std::string bag = resolve_path(arguments.bag, std::filesystem::absolute("here").string());
-  const std::vector<StampedPose> motion = read_motion(bag, scene, arguments.poses);
+  const std::vector<StampedPose> motion = read_motion(file_of(arguments.bag), scene, arguments.poses);
 
   const Steps probe = make_steps(scene, motion, 0.0);
   const double step = quantile(in_contact(probe.seconds, probe), 0.5);
@@ -450,12 +473,12 @@ void bench(const Arguments& arguments, int argc, char** argv) {
   const std::unique_ptr<Child> master = start_master();
   ros::init(argc, argv, "tissue_sim_bench_frame", ros::init_options::AnonymousName | ros::init_options::NoRosout);
   const std::string space = "/frame_" + std::to_string(getpid());
-  const std::string folder = std::filesystem::read_symlink("/proc/self/exe").parent_path().string();
   {
-    Child node(folder + "/tissue_sim_node", {"__name:=tissue_sim", "__ns:=" + space, "_scene:=" + scene_file,
-                                             "_state_period:=" + text("%.9f", scene.time_step)});
+    Child node((this_program().parent_path() / "tissue_sim_node").string(),
+               {"__name:=tissue_sim", "__ns:=" + space, "_scene:=" + scene_file,
+                "_state_period:=" + text("%.9f", scene.time_step)});
     Client client(scene, motion, space);
-    node.wait_until([&] { return client.connected(); });
+    node.wait_until([&] { return client.greet(); });
     client.run(rate, node);
     const Steps steps = make_steps(scene, motion, rate);
     const double all = std::accumulate(steps.seconds.begin(), steps.seconds.end(), 0.0);
