@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <limits>
+#include <cstring>
 #include <numeric>
-#include <unordered_map>
 
 namespace tissue_sim {
 namespace {
@@ -113,12 +112,23 @@ bool is_degenerate(const Vector3& a, const Vector3& b, const Vector3& c) {
   return area_normal(a, b, c).norm() <= degenerate_ratio * longest2;
 }
 
-int count_duplicates(const std::vector<Triangle>& triangles) {
-  std::vector<Triangle> sorted = triangles;
-  for (Triangle& t : sorted) std::sort(t.begin(), t.end());
-  std::sort(sorted.begin(), sorted.end());
+/// Triangles with the same corners meet at their smallest vertex: few are sorted at a time.
+int count_duplicates(int vertex_count, const std::vector<Triangle>& triangles) {
+  std::vector<std::array<int, 1>> smallest;
+  smallest.reserve(triangles.size());
+  for (const Triangle& t : triangles) smallest.push_back({std::min({t[0], t[1], t[2]})});
+  const FlatLists at = invert(vertex_count, smallest);
+  std::vector<Triangle> sorted;
   int duplicates = 0;
-  for (std::size_t i = 1; i < sorted.size(); ++i) duplicates += sorted[i] == sorted[i - 1];
+  for (int v = 0; v < vertex_count; ++v) {
+    sorted.clear();
+    for (const int* t = at.begin(v); t != at.end(v); ++t) {
+      sorted.push_back(triangles[*t]);
+      std::sort(sorted.back().begin(), sorted.back().end());
+    }
+    std::sort(sorted.begin(), sorted.end());
+    for (std::size_t i = 1; i < sorted.size(); ++i) duplicates += sorted[i] == sorted[i - 1];
+  }
   return duplicates;
 }
 
@@ -150,27 +160,47 @@ int count_split_vertices(int vertex_count, const std::vector<Triangle>& triangle
 /// Grid cell of a point: whole numbers, kept as doubles so that no coordinate can overflow.
 struct Cell {
   double x, y, z;
-  bool operator==(const Cell& other) const { return x == other.x && y == other.y && z == other.z; }
 };
 
-struct CellHash {
-  std::size_t operator()(const Cell& cell) const {
-    const std::hash<double> hash;  // equal for 0.0 and -0.0
-    std::uint64_t h = hash(cell.x);
-    for (const double c : {cell.y, cell.z}) {
-      h = (h ^ (h >> 32)) * 0x9e3779b97f4a7c15ull + static_cast<std::uint64_t>(hash(c));
-    }
-    h = (h ^ (h >> 32)) * 0x9e3779b97f4a7c15ull;
-    return static_cast<std::size_t>(h ^ (h >> 29));
+std::uint64_t hash_of(const Cell& cell) {
+  std::uint64_t h = 0;
+  for (const double c : {cell.x, cell.y, cell.z}) {
+    const double same_zero = c + 0.0;  // 0.0 and -0.0 are one place
+    std::uint64_t bits = 0;
+    std::memcpy(&bits, &same_zero, sizeof bits);
+    h = (h ^ (h >> 32) ^ bits) * 0x9e3779b97f4a7c15ull;
   }
+  return h ^ (h >> 29);
+}
+
+/// The kept vertices by their cells. A bucket may hold several cells, which costs a comparison and nothing else:
+/// whoever looks for neighbours compares distances anyway.
+class CellBuckets {
+ public:
+  explicit CellBuckets(std::size_t vertices) : older_(vertices, -1) {
+    std::size_t buckets = 1;
+    while (buckets < vertices) buckets *= 2;
+    newest_.assign(buckets, -1);
+  }
+  int newest(const Cell& cell) const { return newest_[bucket(cell)]; }
+  int older(int vertex) const { return older_[vertex]; }
+  void add(const Cell& cell, int vertex) {
+    int& newest = newest_[bucket(cell)];
+    older_[vertex] = newest;
+    newest = vertex;
+  }
+
+ private:
+  std::size_t bucket(const Cell& cell) const { return hash_of(cell) & (newest_.size() - 1); }
+
+  std::vector<int> newest_;  ///< per bucket, -1: empty
+  std::vector<int> older_;   ///< per vertex, the one before it in its bucket
 };
 
 /// For each vertex the first kept vertex within `tolerance`, itself if there is none. Cells of four tolerances:
 /// most vertices then look into one cell only, and no cell can hold many kept vertices.
 std::vector<int> nearby_first(const std::vector<Vector3>& vertices, double tolerance) {
-  std::unordered_map<Cell, int, CellHash> newest;
-  newest.reserve(vertices.size());
-  std::vector<int> older(vertices.size(), -1);  // the next kept vertex of the same cell
+  CellBuckets kept(vertices.size());
   std::vector<int> keeper(vertices.size());
   const auto cell_of = [&](double x) { return tolerance > 0.0 ? std::floor(x / (4.0 * tolerance)) : x; };
   for (std::size_t v = 0; v < vertices.size(); ++v) {
@@ -184,16 +214,11 @@ std::vector<int> nearby_first(const std::vector<Vector3>& vertices, double toler
     for (std::size_t i = 0; i < 8; ++i) {
       const std::size_t ix = i & 1, iy = (i >> 1) & 1, iz = i >> 2;
       if ((ix && xs[0] == xs[1]) || (iy && ys[0] == ys[1]) || (iz && zs[0] == zs[1])) continue;
-      const auto found = newest.find({xs[ix], ys[iy], zs[iz]});
-      if (found == newest.end()) continue;
-      for (int k = found->second; k >= 0; k = older[k]) {
+      for (int k = kept.newest({xs[ix], ys[iy], zs[iz]}); k >= 0; k = kept.older(k)) {
         if (k < keeper[v] && (vertices[k] - p).norm() <= tolerance) keeper[v] = k;
       }
     }
-    if (keeper[v] != static_cast<int>(v)) continue;
-    int& head = newest.try_emplace({cell_of(p.x()), cell_of(p.y()), cell_of(p.z())}, -1).first->second;
-    older[v] = head;
-    head = static_cast<int>(v);
+    if (keeper[v] == static_cast<int>(v)) kept.add({cell_of(p.x()), cell_of(p.y()), cell_of(p.z())}, keeper[v]);
   }
   return keeper;
 }
@@ -282,7 +307,7 @@ MeshFaults inspect(const TriangleMesh& mesh) {
       faults.components += surfaces.root(v) == v;
     }
   }
-  faults.duplicate_triangles = count_duplicates(sound);
+  faults.duplicate_triangles = count_duplicates(vertex_count, sound);
   faults.non_manifold_vertices = count_split_vertices(vertex_count, sound);
   for_each_edge(sort_half_edges(vertex_count, sound), [&](int, int, const HalfEdge* side, const HalfEdge* last) {
     const auto forward = [&](const HalfEdge& h) { return runs_low_to_high(sound[h.half / 3], h.half % 3); };

@@ -1,17 +1,13 @@
 #include <ros/network.h>
-#include <xmlrpcpp/XmlRpc.h>
 
 #include <cstdlib>
 #include <iostream>
 #include <stdexcept>
 
+#include "tissue_sim/ros/master.h"
 #include "tissue_sim/ros/node.h"
 
 namespace {
-
-struct Silence : XmlRpc::XmlRpcErrorHandler {
-  void error(const char* /*message*/) override {}
-};
 
 /// Before ros::init, which waits for ever for a master to take the parameters of the command line.
 void require_master(int argc, char** argv) {
@@ -26,16 +22,9 @@ void require_master(int argc, char** argv) {
   if (!ros::network::splitURI(uri, host, port)) {
     throw std::runtime_error("ROS_MASTER_URI is \"" + uri + "\"; set it, for example to http://localhost:11311");
   }
-  Silence silence;
-  XmlRpc::XmlRpcErrorHandler* const loud = XmlRpc::XmlRpcErrorHandler::getErrorHandler();
-  XmlRpc::XmlRpcErrorHandler::setErrorHandler(&silence);
-  XmlRpc::XmlRpcClient client(host.c_str(), static_cast<int>(port), "/");
-  XmlRpc::XmlRpcValue request, response;
-  request[0] = "tissue_sim_node";
-  const bool answers = client.execute("getPid", request, response);
-  client.close();
-  XmlRpc::XmlRpcErrorHandler::setErrorHandler(loud);
-  if (!answers) throw std::runtime_error("no ROS master at " + uri + "; start roscore or set ROS_MASTER_URI");
+  if (!tissue_sim::master_answers(uri)) {
+    throw std::runtime_error("no ROS master at " + uri + "; start roscore or set ROS_MASTER_URI");
+  }
 }
 
 }  // namespace

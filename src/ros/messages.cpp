@@ -182,30 +182,38 @@ TissueTopology topology_message(const Scene& scene, int organ) {
   return message;
 }
 
-TissueState state_message(const Scene& scene, const Timeline& timeline, int organ, std::uint32_t topology_id) {
+void fill_state(const Scene& scene, const Timeline& timeline, int organ, std::uint32_t topology_id,
+                TissueState& message) {
   const OrganView view = timeline.organ(organ);
-  TissueState message;
   message.header.frame_id = scene.frame;
   message.header.stamp = to_ros_time(timeline.report().stamp);
   message.organ = scene.organs[static_cast<std::size_t>(organ)].name;
   message.topology_id = topology_id;
   message.step = timeline.report().step;
-  message.positions.reserve(3 * view.positions.size());
-  for (const Vector3& position : view.positions) append(message.positions, position);
-  message.depths.reserve(view.depths.size());
-  for (const double depth : view.depths) message.depths.push_back(static_cast<float>(depth));
+  message.positions.resize(3 * view.positions.size());
+  float* out = message.positions.data();
+  for (const Vector3& position : view.positions) {
+    for (int axis = 0; axis < 3; ++axis) *out++ = static_cast<float>(position[axis]);
+  }
+  message.depths.resize(view.depths.size());
+  for (std::size_t i = 0; i < view.depths.size(); ++i) message.depths[i] = static_cast<float>(view.depths[i]);
+}
+
+TissueState state_message(const Scene& scene, const Timeline& timeline, int organ, std::uint32_t topology_id) {
+  TissueState message;
+  fill_state(scene, timeline, organ, topology_id, message);
   return message;
 }
 
-Contacts contacts_message(const Scene& scene, const StepReport& report) {
-  Contacts message;
+void fill_contacts(const Scene& scene, const StepReport& report, Contacts& message) {
   message.header.frame_id = scene.frame;
   message.header.stamp = to_ros_time(report.stamp);
   message.step = report.step;
-  message.contacts.reserve(report.contacts.size());
-  for (const OrganContact& contact : report.contacts) {
+  message.contacts.resize(report.contacts.size());
+  for (std::size_t i = 0; i < report.contacts.size(); ++i) {
+    const OrganContact& contact = report.contacts[i];
     const Instrument& instrument = scene.instruments[static_cast<std::size_t>(contact.instrument)];
-    Contact out;
+    Contact& out = message.contacts[i];
     out.organ = scene.organs[static_cast<std::size_t>(contact.organ)].name;
     out.instrument = instrument.name;
     out.link = instrument.parts[static_cast<std::size_t>(contact.part)].link;
@@ -217,8 +225,12 @@ Contacts contacts_message(const Scene& scene, const StepReport& report) {
     out.direction = to_vector(contact.direction);
     out.depth = contact.depth;
     out.force = to_vector(contact.force);
-    message.contacts.push_back(std::move(out));
   }
+}
+
+Contacts contacts_message(const Scene& scene, const StepReport& report) {
+  Contacts message;
+  fill_contacts(scene, report, message);
   return message;
 }
 

@@ -3,6 +3,7 @@
 #include <diagnostic_msgs/DiagnosticArray.h>
 
 #include <algorithm>
+#include <boost/make_shared.hpp>
 
 namespace tissue_sim {
 namespace {
@@ -47,6 +48,14 @@ const char* cure(int cause) {
     default:
       return "";
   }
+}
+
+/// The message to fill and publish. Published as a pointer, it goes to subscribers in this process without a copy, and
+/// they may keep it: then the next one is a new one. Subscribers elsewhere have got their bytes when publish() returns.
+template <class Message>
+Message& writable(boost::shared_ptr<Message>& message) {
+  if (!message || message.use_count() > 1) message = boost::make_shared<Message>();
+  return *message;
 }
 
 void add(StepProfile& sum, const StepProfile& step) {
@@ -198,21 +207,36 @@ void Node::after_step(bool holding) {
   last_step_stamp_ = report.stamp;
   if (report.recovered) ROS_ERROR_STREAM("step " << report.step << " went bad: the last good state is back");
 
-  if (report.pose_reached || (holding && report.state_due)) {
-    if (contacts_.getNumSubscribers() > 0) contacts_.publish(contacts_message(scene_, report));
-    for (std::size_t i = 0; i < inputs_.size(); ++i) {
-      const FramedPose* pose = inputs_[i].frames.at(report.stamp);
-      if (pose == nullptr || inputs_[i].wrench.getNumSubscribers() == 0) continue;
-      inputs_[i].wrench.publish(wrench_message(report.wrenches[i], report.stamp, pose->frame, pose->frame_to_scene));
-    }
-  }
+  if (report.pose_reached || (holding && report.state_due)) publish_contacts();
   if (!report.state_due) return;
-  for (std::size_t i = 0; i < outputs_.size(); ++i) {
-    if (outputs_[i].state_publisher.getNumSubscribers() == 0) continue;
-    outputs_[i].state_publisher.publish(
-        state_message(scene_, timeline_, static_cast<int>(i), outputs_[i].topology.topology_id));
-  }
+  publish_states();
   publish_markers();
+}
+
+/// Contacts, and the forces of the instruments.
+void Node::publish_contacts() {
+  const StepReport& report = timeline_.report();
+  if (contacts_.getNumSubscribers() > 0) {
+    fill_contacts(scene_, report, writable(contacts_message_));
+    contacts_.publish(contacts_message_);
+  }
+  for (std::size_t i = 0; i < inputs_.size(); ++i) {
+    Input& input = inputs_[i];
+    const FramedPose* pose = input.frames.at(report.stamp);  // also where nobody listens: it forgets the older ones
+    if (pose == nullptr || input.wrench.getNumSubscribers() == 0) continue;
+    writable(input.wrench_message) =
+        wrench_message(report.wrenches[i], report.stamp, pose->frame, pose->frame_to_scene);
+    input.wrench.publish(input.wrench_message);
+  }
+}
+
+void Node::publish_states() {
+  for (std::size_t i = 0; i < outputs_.size(); ++i) {
+    Output& output = outputs_[i];
+    if (output.state_publisher.getNumSubscribers() == 0) continue;
+    fill_state(scene_, timeline_, static_cast<int>(i), output.topology.topology_id, writable(output.state));
+    output.state_publisher.publish(output.state);
+  }
 }
 
 void Node::publish_markers() {
@@ -223,7 +247,10 @@ void Node::diagnose_when_due() {
   const ros::WallTime now = ros::WallTime::now();
   const bool stopped = pose_since_diagnostics_ && (now - last_pose_).toSec() > poses_stopped_after;
   if (!stopped && (now - last_diagnostics_).toSec() < diagnostics_period) return;
-  publish_diagnostics();
+  if (diagnostics_.getNumSubscribers() > 0) publish_diagnostics();
+  profile_ = {};
+  period_steps_ = 0;
+  period_nanoseconds_ = 0;
   last_diagnostics_ = now;
   if (stopped) pose_since_diagnostics_ = false;
 }
@@ -308,9 +335,6 @@ void Node::publish_diagnostics() {
 
   reported_drops_ = drops;
   reported_recoveries_ = counters.recoveries;
-  profile_ = {};
-  period_steps_ = 0;
-  period_nanoseconds_ = 0;
 }
 
 void Node::warn(std::size_t instrument, int cause, const std::string& what) {

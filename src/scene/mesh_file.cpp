@@ -135,24 +135,29 @@ MeshFaults mend(const std::string& path, TriangleMesh& mesh, std::vector<std::st
   MeshFaults faults = inspect(mesh);
   const int joined = open - faults.boundary_edges;
   warn(joined, "closed " + count(joined, "boundary edge") + " by joining vertices closer than 1e-8 m");
+  int dropped = 0;
   if (faults.degenerate_triangles > 0) {
     const int flat = drop_triangles(mesh, [&](const Triangle& t) {
       return inspect(TriangleMesh{{mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]}, {{0, 1, 2}}})
                  .degenerate_triangles > 0;
     });
     warn(flat, "dropped " + count(flat, "triangle") + " without area");
+    dropped += flat;
   }
   if (faults.duplicate_triangles > 0) {
     const int doubled = drop_duplicates(mesh);
     warn(doubled, "dropped " + count(doubled, "triangle") + " that stand twice");
+    dropped += doubled;
   }
   if (mesh.triangles.empty()) fail(path, "none of its " + count(all, "triangle") + " has an area, export it again");
-  weld(mesh, weld_tolerance);  // drops the vertices that are left over
-  faults = inspect(mesh);
+  if (dropped > 0) {
+    weld(mesh, weld_tolerance);  // drops the vertices that are left over
+    faults = inspect(mesh);
+  }
   if (faults.non_manifold_edges == 0 && faults.non_finite_vertices == 0) {
     const int turned = orient_outward(mesh);
     warn(turned, "turned " + count(turned, "triangle") + " that faced inward");
-    faults = inspect(mesh);
+    if (turned > 0) faults = inspect(mesh);
   }
   return faults;
 }
@@ -188,7 +193,10 @@ TriangleMesh read_mesh(const std::string& path, const Vector3& scale) {
 }
 
 TriangleMesh load_organ_mesh(const std::string& path, double scale, std::vector<std::string>& warnings) {
-  TriangleMesh mesh = read_mesh(path, Vector3::Constant(scale));
+  return mend_organ_mesh(path, read_mesh(path, Vector3::Constant(scale)), warnings);
+}
+
+TriangleMesh mend_organ_mesh(const std::string& path, TriangleMesh mesh, std::vector<std::string>& warnings) {
   const MeshFaults faults = mend(path, mesh, warnings);
   if (!faults.closed_manifold()) fail(path, list_faults(faults) + ": " + cure_of(faults));
   const double size = size_of(mesh);

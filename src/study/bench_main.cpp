@@ -1,9 +1,13 @@
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <string>
 
 #include "tissue_sim/study/element_bench.h"
 #include "tissue_sim/study/json_rows.h"
+#include "tissue_sim/study/load_bench.h"
 #include "tissue_sim/study/paper_accuracy.h"
 #include "tissue_sim/tissue/neo_hookean_batch.h"
 
@@ -12,11 +16,13 @@ namespace {
 using namespace tissue_sim;
 
 constexpr const char* usage =
-    "usage: tissue_sim_bench paper|elements [--accuracy] [--json FILE]\n"
+    "usage: tissue_sim_bench paper|elements|load|frame [--accuracy] [--json FILE]\n"
     "  paper             Table 1 of the paper: 9 pairs of spheres, 3 approaches, milliseconds a collision step\n"
     "  paper --accuracy  its depths, directions and colliding vertices against exact ones\n"
     "  elements          ns a tetrahedron: the forces of a substep, or a sweep of vertex block descent; the\n"
     "                    elements of a substep against one by one and against what the machine can do\n"
+    "  load              an organ of 100,000 and one of 1,000,000 triangles, from the file to the first step\n"
+    "  frame             from pose to published state through ROS; frame --help for what it takes\n"
     "  --json FILE       write the rows to FILE\n";
 
 struct Arguments {
@@ -27,7 +33,8 @@ struct Arguments {
 
 bool read_arguments(int argc, char** argv, Arguments& arguments) {
   arguments.bench = argc > 1 ? argv[1] : "";
-  if (arguments.bench != "paper" && arguments.bench != "elements") return false;
+  const std::string& bench = arguments.bench;
+  if (bench != "paper" && bench != "elements" && bench != "load") return false;
   for (int i = 2; i < argc; ++i) {
     const std::string word = argv[i];
     if (word == "--accuracy" && arguments.bench == "paper") {
@@ -161,6 +168,28 @@ JsonRows bench_elements() {
   return json;
 }
 
+JsonRows bench_loading() {
+  JsonRows json;
+  std::printf("An ellipsoid from its mesh file to the first step, seconds on one core\n\n");
+  std::printf(
+      "triangles  file  model         seconds = read    weld+check  topology  rest shape      tree   resident [MB]\n");
+  for (const int triangles : {100'000, 1'000'000}) {
+    for (const LoadCost& cost : time_loading(triangles)) {
+      std::printf("%9d  %-4s  %-12s  %7.3f  %6.3f  %12.3f  %8.3f  %10.3f  %8.3f  %14.0f\n", cost.triangles,
+                  cost.file.c_str(), to_string(cost.model), cost.whole, cost.read, cost.mend, cost.topology,
+                  cost.rest_shape, cost.tree, 1e-6 * cost.memory);
+      std::fflush(stdout);
+      json.add(
+          text("\"triangles\": %d, \"file\": \"%s\", \"model\": \"%s\", \"seconds\": %.6g, \"seconds_read\": %.6g, "
+               "\"seconds_weld_and_check\": %.6g, \"seconds_topology\": %.6g, \"seconds_rest_shape\": %.6g, "
+               "\"seconds_tree\": %.6g, \"memory_mb\": %.6g",
+               cost.triangles, cost.file.c_str(), to_string(cost.model), cost.whole, cost.read, cost.mend,
+               cost.topology, cost.rest_shape, cost.tree, 1e-6 * cost.memory));
+    }
+  }
+  return json;
+}
+
 bool write_json(const std::string& path, const Arguments& arguments, const JsonRows& json) {
   std::FILE* file = std::fopen(path.c_str(), "w");
   if (!file) return false;
@@ -169,9 +198,19 @@ bool write_json(const std::string& path, const Arguments& arguments, const JsonR
   return std::fclose(file) == 0;
 }
 
+/// The part that speaks ROS is a program of its own beside this one.
+int run_frame(char** argv) {
+  const std::string program =
+      (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "tissue_sim_bench_frame").string();
+  execv(program.c_str(), argv + 1);
+  std::fprintf(stderr, "%s: cannot be run, it belongs to the package: build and install all of it\n", program.c_str());
+  return 1;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (argc > 1 && std::string(argv[1]) == "frame") return run_frame(argv);
   if (argc == 2 && std::string(argv[1]) == "--help") {
     std::fputs(usage, stdout);
     return 0;
@@ -182,6 +221,7 @@ int main(int argc, char** argv) {
     return 2;
   }
   const JsonRows json = arguments.bench == "elements" ? bench_elements()
+                        : arguments.bench == "load"   ? bench_loading()
                         : arguments.accuracy          ? bench_accuracy()
                                                       : bench_table_1();
   if (!arguments.json.empty() && !write_json(arguments.json, arguments, json)) {

@@ -2,6 +2,7 @@
 #include <chrono>
 #include <cstdio>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tissue_sim/geometry/aabb_tree.h"
@@ -59,7 +60,7 @@ double time_passes(Pass pass) {
 }
 
 /// The elements of one kind alone, as the explicit integrator has them: s a substep.
-double time_elements(RestShape rest) {
+double time_elements(RestShape& rest) {
   pack_elements(rest);
   OrganState state;
   state.positions = rest.positions;
@@ -71,7 +72,7 @@ double time_elements(RestShape rest) {
 }
 
 /// `off`, or how many there are and what they cost.
-std::string elements_text(std::size_t count, std::size_t bytes, const OrganSummary& summary, const RestShape& alone) {
+std::string elements_text(std::size_t count, std::size_t bytes, const OrganSummary& summary, RestShape& alone) {
   if (count == 0) return "off";
   const std::string stored = text("on: %zu, ", count) + size_of(bytes);
   if (summary.integrator != Integrator::explicit_substeps) return stored + ", their time is the integrator's";
@@ -85,37 +86,41 @@ std::size_t bytes(const std::vector<Item>& items) {
 
 /// What the organ's model stores and steps, each as off, or on with its cost on this machine.
 void print_features(const Organ& organ, const OrganSummary& summary) {
-  const RestShape rest = build_rest_shape(organ);
-  RestShape none = rest;
-  none.distances.clear();
-  none.areas.clear();
-  none.volumes.clear();
-  none.tetrahedra.clear();
-  none.enclosed.stiffness = 0.0;
-  RestShape alone = none;
-  alone.tetrahedra = rest.tetrahedra;
-  const std::size_t packed = sizeof(NeoHookeanBatch) / NeoHookeanBatch::lanes * rest.tetrahedra.size();
+  // Each kind is put back alone, for its time. Moved, not copied: an organ of a million triangles has half a gigabyte.
+  RestShape alone = build_rest_shape(organ);
+  auto tetrahedra = std::move(alone.tetrahedra);
+  auto distances = std::move(alone.distances);
+  auto areas = std::move(alone.areas);
+  auto volumes = std::move(alone.volumes);
+  const EnclosedVolume enclosed = std::exchange(alone.enclosed, {});
+  alone.tetrahedra.clear();
+  alone.distances.clear();
+  alone.areas.clear();
+  alone.volumes.clear();
+
+  alone.tetrahedra.swap(tetrahedra);
+  const std::size_t packed = sizeof(NeoHookeanBatch) / NeoHookeanBatch::lanes * alone.tetrahedra.size();
   row("tetrahedra", organ.model == Model::volume
                         ? text("on: %d, as distance and volume elements", summary.tetrahedra)
-                        : elements_text(rest.tetrahedra.size(), bytes(rest.tetrahedra) + packed, summary, alone));
-  alone = none;
-  alone.distances = rest.distances;
-  row("distance elements", elements_text(rest.distances.size(), bytes(rest.distances), summary, alone));
-  alone = none;
-  alone.areas = rest.areas;
-  row("area elements", elements_text(rest.areas.size(), bytes(rest.areas), summary, alone));
-  alone = none;
-  alone.volumes = rest.volumes;
-  row("volume elements", elements_text(rest.volumes.size(), bytes(rest.volumes), summary, alone));
-  alone = none;
-  alone.enclosed = rest.enclosed;
-  row("enclosed volume", elements_text(summary.enclosed_volume ? 1 : 0, sizeof rest.enclosed, summary, alone));
-  row("plastic state", summary.plastic ? "on: " + size_of(rest.positions.size()) : "off");
-  std::vector<Vector3> positions = rest.positions;
+                        : elements_text(alone.tetrahedra.size(), bytes(alone.tetrahedra) + packed, summary, alone));
+  alone.tetrahedra.swap(tetrahedra);
+  alone.distances.swap(distances);
+  row("distance elements", elements_text(alone.distances.size(), bytes(alone.distances), summary, alone));
+  alone.distances.swap(distances);
+  alone.areas.swap(areas);
+  row("area elements", elements_text(alone.areas.size(), bytes(alone.areas), summary, alone));
+  alone.areas.swap(areas);
+  alone.volumes.swap(volumes);
+  row("volume elements", elements_text(alone.volumes.size(), bytes(alone.volumes), summary, alone));
+  alone.volumes.swap(volumes);
+  alone.enclosed = enclosed;
+  row("enclosed volume", elements_text(summary.enclosed_volume ? 1 : 0, sizeof enclosed, summary, alone));
+  row("plastic state", summary.plastic ? "on: " + size_of(alone.positions.size()) : "off");
+  std::vector<Vector3> positions = alone.positions;
   row("embedded surface", !summary.embedded
                               ? "off"
-                              : text("on: %d vertices carried, %.3g ms a step", rest.first_simulated,
-                                     1e3 * summary.substeps * time_passes([&] { carry_surface(rest, positions); })));
+                              : text("on: %d vertices carried, %.3g ms a step", alone.first_simulated,
+                                     1e3 * summary.substeps * time_passes([&] { carry_surface(alone, positions); })));
 }
 
 void print_organ(const Organ& organ, const OrganSummary& summary) {
@@ -175,8 +180,10 @@ void print_cost(const Scene& scene) {
   const auto cost = [&](double seconds) {
     return text("%.3f ms a step, %.2f of real time", 1e3 * seconds, seconds / scene.time_step);
   };
-  Timeline apart(scene);
-  row("instrument away", cost(time_apart(scene, timed_seconds, apart)));
+  {
+    Timeline apart(scene);
+    row("instrument away", cost(time_apart(scene, timed_seconds, apart)));
+  }
   for (std::size_t o = 0; o < scene.organs.size(); ++o) {
     Timeline timeline(scene);
     const PressCost press = time_press(scene, static_cast<int>(o), timed_seconds, timeline);
@@ -209,9 +216,12 @@ void check(const std::string& path) {
   std::vector<ModelChoice> choices;
   const Scene scene = load_chosen_scene(path, warnings, choices);
   for (const std::string& warning : warnings) std::printf("warning: %s\n", warning.c_str());
-  const Timeline timeline = [&] {
+  const std::vector<OrganSummary> summaries = [&] {
     try {
-      return Timeline(scene);
+      const Timeline timeline(scene);
+      std::vector<OrganSummary> all;
+      for (std::size_t o = 0; o < scene.organs.size(); ++o) all.push_back(timeline.summary(static_cast<int>(o)));
+      return all;
     } catch (const SceneError& error) {
       throw SceneError(path + ": " + error.what());
     }
@@ -224,7 +234,7 @@ void check(const std::string& path) {
   row("time step", text("%.4g s, at most %d substeps", scene.time_step, scene.max_substeps));
   print_choices(scene.accuracy, choices);
   for (std::size_t o = 0; o < scene.organs.size(); ++o) {
-    print_organ(scene.organs[o], timeline.summary(static_cast<int>(o)));
+    print_organ(scene.organs[o], summaries[o]);
   }
   for (const Instrument& instrument : scene.instruments) print_instrument(instrument);
   print_outputs(scene);

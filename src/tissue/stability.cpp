@@ -1,5 +1,6 @@
 #include "tissue_sim/tissue/stability.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -9,6 +10,12 @@ namespace tissue_sim {
 namespace {
 
 constexpr int power_iterations = 200;
+
+/// Vertices from which on Lanczos takes the place of power iteration, which took 32 s for a wall of a million
+/// triangles. After 20 steps it is within 0.1 % of the fastest frequency, as 200 power iterations are (measured on
+/// walls of 4,000 to 500,000 vertices). Below, the old figure stays, to the bit.
+constexpr std::size_t many_vertices = 20000;
+constexpr int lanczos_steps = 20;
 
 template <class Kind>
 void add_row_sums(const std::vector<Kind>& elements, const std::vector<Vector3>& positions, std::vector<double>& sums) {
@@ -59,12 +66,8 @@ void add_product(const std::vector<NeoHookeanElement>& tetrahedra, const std::ve
   }
 }
 
-/// The largest eigenvalue of M^-1/2 A M^-1/2, where product(x, y) adds A x to y.
-template <class Product>
-double largest_eigenvalue(const RestShape& shape, Product&& product) {
-  const std::size_t n = shape.positions.size();
+std::vector<Vector3> random_vectors(std::size_t n) {
   std::vector<Vector3> x(n);
-  std::vector<Vector3> y(n);
   std::uint32_t random = 1;
   for (Vector3& v : x) {
     for (double& component : {std::ref(v.x()), std::ref(v.y()), std::ref(v.z())}) {
@@ -72,6 +75,64 @@ double largest_eigenvalue(const RestShape& shape, Product&& product) {
       component = static_cast<double>(random) / 4294967296.0 - 0.5;
     }
   }
+  return x;
+}
+
+/// Lanczos without reorthogonalisation: its copies of an eigenvalue do not move the largest. From below, as power
+/// iteration.
+template <class Product>
+double largest_of_many(const RestShape& shape, Product&& product) {
+  const std::size_t n = shape.positions.size();
+  std::vector<Vector3> x = random_vectors(n);
+  std::vector<Vector3> before(n, Vector3::Zero());
+  std::vector<Vector3> y(n);
+  double length = 0.0;  // of x
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!(shape.inverse_mass[i] > 0.0)) x[i].setZero();
+    length += x[i].squaredNorm();
+  }
+  length = std::sqrt(length);
+  Eigen::VectorXd diagonal(lanczos_steps);
+  Eigen::VectorXd beside(lanczos_steps);
+  int steps = 0;
+  while (steps < lanczos_steps && length > 0.0) {
+    for (std::size_t i = 0; i < n; ++i) {
+      x[i] *= std::sqrt(shape.inverse_mass[i]) / length;
+      y[i].setZero();
+    }
+    product(x, y);
+    double along = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+      y[i] *= std::sqrt(shape.inverse_mass[i]);
+      if (shape.inverse_mass[i] > 0.0) x[i] /= std::sqrt(shape.inverse_mass[i]);
+      along += x[i].dot(y[i]);
+    }
+    const double back = steps > 0 ? beside[steps - 1] : 0.0;
+    length = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+      y[i] -= along * x[i] + back * before[i];
+      length += y[i].squaredNorm();
+    }
+    length = std::sqrt(length);
+    diagonal[steps] = along;
+    beside[steps] = length;
+    ++steps;
+    before.swap(x);
+    x.swap(y);
+  }
+  if (steps == 0) return 0.0;
+  Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver;
+  solver.computeFromTridiagonal(diagonal.head(steps), beside.head(steps - 1), Eigen::EigenvaluesOnly);
+  return solver.eigenvalues().maxCoeff();
+}
+
+/// The largest eigenvalue of M^-1/2 A M^-1/2, where product(x, y) adds A x to y.
+template <class Product>
+double largest_eigenvalue(const RestShape& shape, Product&& product) {
+  const std::size_t n = shape.positions.size();
+  if (n > many_vertices) return largest_of_many(shape, product);
+  std::vector<Vector3> x = random_vectors(n);
+  std::vector<Vector3> y(n);
 
   double eigenvalue = 0.0;
   for (int iteration = 0; iteration < power_iterations; ++iteration) {

@@ -86,6 +86,38 @@ TEST(Messages, ContactsAreNamed) {
   EXPECT_EQ(message.contacts[0].force.z, -0.5);
 }
 
+TEST(Messages, AMessageFilledAgainIsAsANewOne) {
+  const Scene scene = ball_scene();
+  Timeline timeline(scene);
+  const auto press = [&](std::int64_t stamp, double depth) {
+    timeline.add_pose(0, {stamp, {Vector3(0.0, 0.0, 0.035 - depth), Eigen::Quaterniond::Identity()}});
+    while (timeline.step()) {
+    }
+  };
+  press(1'000'000'000, 0.004);
+  TissueState state = state_message(scene, timeline, 0, 77);
+  Contacts contacts = contacts_message(scene, timeline.report());
+  ASSERT_GT(contacts.contacts.size(), 1U);
+  const float* const room = state.positions.data();
+
+  press(1'001'000'000, 0.003);
+  fill_state(scene, timeline, 0, 77, state);
+  fill_contacts(scene, timeline.report(), contacts);
+  EXPECT_EQ(state, state_message(scene, timeline, 0, 77));
+  EXPECT_EQ(contacts, contacts_message(scene, timeline.report()));
+  EXPECT_EQ(state.positions.data(), room) << "nothing is allocated again";
+  const OrganView view = timeline.organ(0);
+  ASSERT_EQ(state.positions.size(), 3 * view.positions.size());
+  for (std::size_t v = 0; v < view.positions.size(); ++v) {
+    EXPECT_EQ(state.positions[3 * v + 2], static_cast<float>(view.positions[v].z()));
+    EXPECT_EQ(state.depths[v], static_cast<float>(view.depths[v]));
+  }
+
+  press(1'002'000'000, -0.010);
+  fill_contacts(scene, timeline.report(), contacts);
+  EXPECT_TRUE(contacts.contacts.empty());
+}
+
 TEST(Messages, WrenchTurnsIntoThePosesFrame) {
   Wrench wrench;
   wrench.force = Vector3::UnitX();

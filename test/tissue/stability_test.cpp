@@ -285,6 +285,43 @@ TEST(FastestFrequency, OfASolidIsThatOfTheWholeMatrix) {
   }
 }
 
+/// Power iteration until nothing changes any more, in the plainest way.
+double iterated_frequency(const RestShape& shape) {
+  std::vector<Vector3> x(shape.positions.size());
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const double angle = static_cast<double>(i);
+    x[i] = Vector3(std::sin(angle), std::sin(2.3 * angle), std::sin(7.1 * angle));
+  }
+  double norm = 1.0;
+  for (int iteration = 0; iteration < 200; ++iteration) {
+    for (std::size_t i = 0; i < x.size(); ++i) x[i] *= std::sqrt(shape.inverse_mass[i]) / norm;
+    std::vector<Vector3> y(x.size(), Vector3::Zero());
+    add_stiffness_product(shape, x, y);
+    norm = 0.0;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      x[i] = std::sqrt(shape.inverse_mass[i]) * y[i];
+      norm += x[i].squaredNorm();
+    }
+    norm = std::sqrt(norm);
+  }
+  return std::sqrt(norm);
+}
+
+TEST(FastestFrequency, OfManyVerticesIsThatOfPowerIteration) {
+  Organ organ;
+  organ.mesh = make_sphere(0.05, 146);
+  organ.model = Model::surface;
+  organ.wall_thickness = 0.003;
+  organ.material = {5400.0, 0.45, 1060.0, 0.1, 5.0};
+  organ.attached = {0, 1, 2, 3};
+  const RestShape shape = build_rest_shape(organ);
+  ASSERT_GT(shape.positions.size(), 20000U) << "where Lanczos takes over";
+  const double exact = iterated_frequency(shape);
+  EXPECT_NEAR(shape.fastest_frequency, exact, 0.002 * exact);
+  EXPECT_GT(shape.stable_substep, 0.5 * 0.4 * 2.0 / exact);
+  EXPECT_LE(shape.stable_substep, 0.4 * 2.0 / shape.fastest_frequency);
+}
+
 TEST(StableSubstep, OfASolidIsASafePartOfTheTextbooks) {
   // Without damping 2 / omega; stiffness-proportional damping takes a little.
   const RestShape undamped = solid_block(Model::fem, 0.0);

@@ -32,6 +32,11 @@ TissueState state_message(const Scene& scene, const Timeline& timeline, int orga
 /// The contacts of the timeline's last step.
 Contacts contacts_message(const Scene& scene, const StepReport& report);
 
+/// The same into a message that was filled before: what fits into the room it has is not allocated again.
+void fill_state(const Scene& scene, const Timeline& timeline, int organ, std::uint32_t topology_id,
+                TissueState& message);
+void fill_contacts(const Scene& scene, const StepReport& report, Contacts& message);
+
 /// Force and torque about the tip, on the instrument, turned from the scene's frame into `frame`.
 geometry_msgs::WrenchStamped wrench_message(const Wrench& wrench, std::int64_t stamp, const std::string& frame,
                                             const Eigen::Quaterniond& frame_to_scene);

@@ -49,6 +49,7 @@ class Node {
   struct Input {
     ros::Subscriber subscriber;
     ros::Publisher wrench;
+    boost::shared_ptr<geometry_msgs::WrenchStamped> wrench_message;  ///< see writable()
     std::deque<Waiting> waiting;  ///< for their transform, in the order in which they came
     FrameHistory frames;
     std::vector<ros::WallTime> last_warning = std::vector<ros::WallTime>(pose_verdicts + 1);  ///< by cause
@@ -58,6 +59,7 @@ class Node {
   struct Output {
     ros::Publisher topology_publisher, state_publisher;
     TissueTopology topology;
+    boost::shared_ptr<TissueState> state;  ///< see writable()
   };
 
   void advertise();
@@ -67,6 +69,8 @@ class Node {
   void step_while_poses_allow();
   void hold_in_realtime();
   void after_step(bool holding);
+  void publish_contacts();
+  void publish_states();
   void publish_markers();
   void publish_diagnostics();
   void diagnose_when_due();
@@ -88,6 +92,7 @@ class Node {
   std::vector<Input> inputs_;
   std::vector<Output> outputs_;
   ros::Publisher contacts_, markers_, diagnostics_;
+  boost::shared_ptr<Contacts> contacts_message_;  ///< see writable()
   ros::ServiceServer reset_server_, topology_server_;
 
   // The clock at the last pose, for advance: realtime.

@@ -20,6 +20,9 @@ TriangleMesh read_mesh(const std::string& path, const Vector3& scale);
 /// of one or more components. Warns of what was mended; throws SceneError for what cannot be.
 TriangleMesh load_organ_mesh(const std::string& path, double scale, std::vector<std::string>& warnings);
 
+/// The same of a mesh that was read from `path`.
+TriangleMesh mend_organ_mesh(const std::string& path, TriangleMesh mesh, std::vector<std::string>& warnings);
+
 struct InstrumentMesh {
   TriangleMesh mesh;
   bool closed = true;  ///< closed and manifold, so that inside and outside are defined everywhere
