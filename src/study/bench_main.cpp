@@ -2,130 +2,16 @@
 #include <cstdio>
 #include <string>
 
+#include "tissue_sim/study/bench.h"
 #include "tissue_sim/study/element_bench.h"
-#include "tissue_sim/study/json_rows.h"
-#include "tissue_sim/study/paper_accuracy.h"
 #include "tissue_sim/tissue/neo_hookean_batch.h"
 
 namespace {
 
 using namespace tissue_sim;
 
-constexpr const char* usage =
-    "usage: tissue_sim_bench paper|elements [--accuracy] [--json FILE]\n"
-    "  paper             Table 1 of the paper: 9 pairs of spheres, 3 approaches, milliseconds a collision step\n"
-    "  paper --accuracy  its depths, directions and colliding vertices against exact ones\n"
-    "  elements          ns a tetrahedron: the forces of a substep, or a sweep of vertex block descent\n"
-    "  --json FILE       write the rows to FILE\n";
-
-struct Arguments {
-  std::string bench;
-  bool accuracy = false;
-  std::string json;
-};
-
-bool read_arguments(int argc, char** argv, Arguments& arguments) {
-  arguments.bench = argc > 1 ? argv[1] : "";
-  if (arguments.bench != "paper" && arguments.bench != "elements") return false;
-  for (int i = 2; i < argc; ++i) {
-    const std::string word = argv[i];
-    if (word == "--accuracy" && arguments.bench == "paper") {
-      arguments.accuracy = true;
-    } else if (word == "--json" && i + 1 < argc) {
-      arguments.json = argv[++i];
-    } else {
-      return false;
-    }
-  }
-  return true;
-}
-
-int triangles(int slices) {
-  return 2 * slices * (slices - 1);
-}
-double degrees(double radians) {
-  return radians * 180.0 / 3.14159265358979323846;
-}
-
-JsonRows bench_table_1() {
-  JsonRows json;
-  std::printf(
-      "Table 1: ms a collision step, mean over the steps with contact (one core), beside the paper's (1.7 GHz, about "
-      "2006)\n\n");
-  std::printf(
-      "test  rigid  deformable  approach               ours       paper     ratio   detect   border   inward  response "
-      "  deform\n");
-  for (std::size_t test = 0; test < paper_tests.size(); ++test) {
-    for (int a = 0; a < approaches; ++a) {
-      const Approach approach = static_cast<Approach>(a);
-      const PaperResult result = run_paper_test(paper_tests[test], approach);
-      const StepProfile& mean = result.mean;
-      const double detection = 1e3 * (mean.refit + mean.detection);
-      const double paper = 1e3 * paper_tests[test].seconds[static_cast<std::size_t>(a)];
-      const int rigid = triangles(paper_tests[test].rigid);
-      const int deformable = triangles(paper_tests[test].deformable);
-      std::printf("%4zu  %5d  %10d  %-19s %8.4f  %9.2f  %8.0f %8.4f %8.4f %8.4f  %8.4f %8.4f\n", test + 1, rigid,
-                  deformable, to_string(approach), 1e3 * mean.total, paper, paper / (1e3 * mean.total), detection,
-                  1e3 * mean.penetration, 1e3 * mean.propagation, 1e3 * mean.response, 1e3 * mean.deformation);
-      std::fflush(stdout);
-      json.add(
-          text("\"test\": %zu, \"rigid_triangles\": %d, \"deformable_triangles\": %d, \"approach\": \"%s\", "
-               "\"ms_per_step\": %.6g, \"ms_detection\": %.6g, \"ms_penetration\": %.6g, \"ms_propagation\": %.6g, "
-               "\"ms_response\": %.6g, \"ms_deformation\": %.6g, \"steps_with_contact\": %d, \"substeps\": %d, "
-               "\"recoveries\": %d, \"paper_ms\": %.6g, \"hash\": \"%016llx\"",
-               test + 1, rigid, deformable, to_string(approach), 1e3 * mean.total, detection, 1e3 * mean.penetration,
-               1e3 * mean.propagation, 1e3 * mean.response, 1e3 * mean.deformation, result.steps_with_contact,
-               result.substeps, result.recoveries, paper, static_cast<unsigned long long>(result.hash)));
-    }
-  }
-  return json;
-}
-
-void print_depth_error(JsonRows& json, const PaperTest& test, const char* where, const DepthError& error) {
-  std::printf("%5d  %10d  %-6s  %8d  %9.1f  %8.0f  %8.2f  %10.1f  %9.1f\n", triangles(test.rigid),
-              triangles(test.deformable), where, error.vertices, 100.0 * error.depth_mean, 100.0 * error.depth_max,
-              1e3 * error.depth_max_m, degrees(error.direction_mean), degrees(error.direction_max));
-  json.add(
-      text("\"measure\": \"depth\", \"rigid_triangles\": %d, \"deformable_triangles\": %d, \"where\": \"%s\", "
-           "\"vertices\": %d, \"depth_error_mean\": %.6g, \"depth_error_max\": %.6g, \"depth_error_max_m\": %.6g, "
-           "\"direction_error_mean_rad\": %.6g, \"direction_error_max_rad\": %.6g",
-           triangles(test.rigid), triangles(test.deformable), where, error.vertices, error.depth_mean, error.depth_max,
-           error.depth_max_m, error.direction_mean, error.direction_max));
-}
-
-JsonRows bench_accuracy() {
-  JsonRows json;
-  std::printf(
-      "Depth and direction by Eq. 1-6 against the closest point of the instrument, undeformed organ, paper's path\n\n");
-  std::printf("rigid  deformable  where   vertices  depth mean  max  [%%]  max [mm]  angle mean   max [deg]\n");
-  for (const PaperTest& test : paper_tests) {
-    const DepthAccuracy accuracy = measure_depths(test);
-    print_depth_error(json, test, "border", accuracy.border);
-    print_depth_error(json, test, "inner", accuracy.inner);
-  }
-  std::printf("\nColliding vertices against an exact inside test, %% of those inside\n\n");
-  std::printf("rigid  deformable  set    motion          inside    false   missed\n");
-  for (const PaperTest& test : {paper_tests.front(), paper_tests[4], paper_tests.back()}) {
-    for (const CollidingSet set : {CollidingSet::paper, CollidingSet::flood}) {
-      for (const SetMotion& motion : set_motions()) {
-        const SetError error = measure_set(test, set, motion);
-        const double all = std::max(1, error.colliding);
-        std::printf("%5d  %10d  %-5s  %-14s %7d  %6.2f%%  %6.2f%%\n", triangles(test.rigid), triangles(test.deformable),
-                    to_string(set), motion.name, error.colliding, 100.0 * error.falsely / all,
-                    100.0 * error.missed / all);
-        json.add(text(
-            "\"measure\": \"colliding_set\", \"rigid_triangles\": %d, \"deformable_triangles\": %d, \"set\": \"%s\", "
-            "\"motion\": \"%s\", \"inside\": %d, \"false\": %d, \"missed\": %d",
-            triangles(test.rigid), triangles(test.deformable), to_string(set), motion.name, error.colliding,
-            error.falsely, error.missed));
-      }
-    }
-  }
-  return json;
-}
-
-JsonRows bench_elements() {
-  JsonRows json;
+bool bench_elements(BenchWords words, JsonRows& json) {
+  if (!words.words.empty()) return false;
   std::printf("A block of cut cubes, one core, registers: %s\n\n", name(instruction_set()));
   std::printf("model   integrator            tetrahedra  ns a tetrahedron\n");
   for (const ElementCost& cost : time_elements()) {
@@ -134,35 +20,56 @@ JsonRows bench_elements() {
     json.add(text("\"model\": \"%s\", \"integrator\": \"%s\", \"tetrahedra\": %d, \"ns_per_tetrahedron\": %.6g",
                   to_string(cost.model), to_string(cost.integrator), cost.tetrahedra, ns));
   }
-  return json;
+  return true;
 }
 
-bool write_json(const std::string& path, const Arguments& arguments, const JsonRows& json) {
+struct Command {
+  const char* name;
+  BenchRun run;
+  const char* about;
+};
+
+constexpr Command commands[] = {
+    {"paper", bench_paper,
+     "  paper             Table 1 of the paper: 9 pairs of spheres, 3 approaches, milliseconds a collision step\n"
+     "  paper --accuracy  its depths, directions and colliding vertices against exact ones\n"},
+    {"elements", bench_elements,
+     "  elements          ns a tetrahedron: the forces of a substep, or a sweep of vertex block descent\n"},
+};
+
+void print_usage(std::FILE* file) {
+  std::fputs("usage: tissue_sim_bench COMMAND [--json FILE]\n", file);
+  for (const Command& command : commands) std::fputs(command.about, file);
+  std::fputs("  --json FILE       write the rows to FILE\n", file);
+}
+
+bool write_json(const std::string& path, const char* bench, const JsonRows& json) {
   std::FILE* file = std::fopen(path.c_str(), "w");
   if (!file) return false;
-  std::fprintf(file, "{\n  \"bench\": \"%s\",\n  \"accuracy\": %s,\n  \"rows\": [%s\n  ]\n}\n", arguments.bench.c_str(),
-               arguments.accuracy ? "true" : "false", json.rows.c_str());
+  std::fprintf(file, "{\n  \"bench\": \"%s\",\n  \"rows\": [%s\n  ]\n}\n", bench, json.rows.c_str());
   return std::fclose(file) == 0;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc == 2 && std::string(argv[1]) == "--help") {
-    std::fputs(usage, stdout);
+  BenchWords words = {{argv + 1, argv + argc}};
+  if (words.words.size() == 1 && words.words.front() == "--help") {
+    print_usage(stdout);
     return 0;
   }
-  Arguments arguments;
-  if (!read_arguments(argc, argv, arguments)) {
-    std::fputs(usage, stderr);
+  const std::string name = words.words.empty() ? "" : words.words.front();
+  const auto command =
+      std::find_if(std::begin(commands), std::end(commands), [&](const Command& known) { return known.name == name; });
+  words.take(name);
+  const std::string path = words.take_value("--json");
+  JsonRows json;
+  if (command == std::end(commands) || !command->run(words, json)) {
+    print_usage(stderr);
     return 2;
   }
-  const JsonRows json = arguments.bench == "elements" ? bench_elements()
-                        : arguments.accuracy          ? bench_accuracy()
-                                                      : bench_table_1();
-  if (!arguments.json.empty() && !write_json(arguments.json, arguments, json)) {
-    std::fprintf(stderr, "tissue_sim_bench: %s cannot be written: check the folder and its rights\n",
-                 arguments.json.c_str());
+  if (!path.empty() && !write_json(path, command->name, json)) {
+    std::fprintf(stderr, "tissue_sim_bench: %s cannot be written: check the folder and its rights\n", path.c_str());
     return 1;
   }
   return 0;
