@@ -17,6 +17,10 @@ struct BenchWords {
 
   /// Takes the word `name` and the one after it out. Empty: they are not there.
   std::string take_value(const std::string& name);
+
+  /// The same for a whole number, which is left as it is where they are not there. False: not a number from `least` to
+  /// `most`.
+  bool take_number(const std::string& name, int least, int most, int& number);
 };
 
 /// Takes its options, prints its table and adds its rows. False, and nothing is run: words that it does not know.
