@@ -34,6 +34,8 @@ constexpr Command commands[] = {
      "  paper [--test N] [--runs N]  Table 1 of the paper: 9 pairs of spheres, 3 approaches, milliseconds a collision\n"
      "                               step; beside the paper's and the plain version's; the fastest of 3 runs\n"
      "  paper --accuracy             its depths, directions and colliding vertices against exact ones\n"},
+    {"peers", bench_peers,
+     "  peers [--runs N] [--peer bullet|fcl]  its test 9 against Bullet's soft body and FCL's detection\n"},
     {"elements", bench_elements,
      "  elements                     ns a tetrahedron: the forces of a substep, or a sweep of vertex block descent\n"},
 };
