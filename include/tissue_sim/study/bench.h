@@ -29,5 +29,6 @@ using BenchRun = bool (*)(BenchWords words, JsonRows& json);
 /// One a file src/study/<name>_bench.cpp, in the table of bench_main.cpp.
 bool bench_paper(BenchWords words, JsonRows& json);
 bool bench_peers(BenchWords words, JsonRows& json);
+bool bench_scale(BenchWords words, JsonRows& json);
 
 }  // namespace tissue_sim
