@@ -38,6 +38,8 @@ constexpr Command commands[] = {
      "  peers [--runs N] [--peer bullet|fcl]  its test 9 against Bullet's soft body and FCL's detection\n"},
     {"scale", bench_scale,
      "  scale [--sizes N,N,...]      an organ that grows from 10,000 to 1,000,000 triangles under the same press\n"},
+    {"limits", bench_limits,
+     "  limits                       bytes and operations of a step against what one core can do\n"},
     {"elements", bench_elements,
      "  elements                     ns a tetrahedron: the forces of a substep, or a sweep of vertex block descent\n"},
 };

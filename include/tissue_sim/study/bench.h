@@ -30,5 +30,6 @@ using BenchRun = bool (*)(BenchWords words, JsonRows& json);
 bool bench_paper(BenchWords words, JsonRows& json);
 bool bench_peers(BenchWords words, JsonRows& json);
 bool bench_scale(BenchWords words, JsonRows& json);
+bool bench_limits(BenchWords words, JsonRows& json);
 
 }  // namespace tissue_sim
