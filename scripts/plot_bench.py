@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """Draws what a step costs, from the JSON files of tissue_sim_bench: `paper` as bars of where the time of a step goes, in
-the fast step and in the plain one, `scale` as the cost of a step against the size of the organ."""
+the fast step and in the plain one, `scale` as the cost of a step against the size of the organ. Writes the rows of these,
+`peers` and `limits` as the tables of doc/performance.md."""
 import argparse
 import json
 import pathlib
@@ -92,19 +93,71 @@ def draw_scale(rows, path):
     plt.close(figure)
 
 
+def ms(value):
+    return f"{value:.3f}"
+
+
+def count(value):
+    return f"{value:,.0f}"
+
+
+def ratio(value):
+    return f"{value:.1f}" if value < 100 else f"{value:.0f}"
+
+
+# Of each bench: which rows, and of each column its head, key and how it is written.
+TABLES = {
+    "paper": (lambda row: True, (
+        ("test", "test", count), ("rigid", "rigid_triangles", count), ("deformable", "deformable_triangles", count),
+        ("approach", "approach", lambda word: word.replace("_", " ")), ("ours", "ms_per_step", ms),
+        ("paper", "paper_ms", ratio), ("ratio", "paper_ratio", ratio), ("plain", "plain_ms", ms),
+        ("ratio", "plain_ratio", ratio), ("detection", "ms_detection", ms), ("border depths", "ms_penetration", ms),
+        ("inward", "ms_propagation", ms), ("response", "ms_response", ms), ("deformation", "ms_deformation", ms),
+        ("health", "ms_health", ms), ("contacts", "contacts", count))),
+    "peers": (lambda row: "ratio" in row, (
+        ("case", "case", str), ("peer", "peer", str), ("settings", "peer_settings", str), ("ours_ms", "ours_ms", ms),
+        ("peer_ms", "peer_ms", ms), ("ratio", "ratio", ratio), ("our contacts", "our_contacts", count),
+        ("the peer's", "peer_contacts", count))),
+    "scale": (lambda row: True, (
+        ("organ_triangles", "organ_triangles", count), ("active_vertices", "active_vertices", count),
+        ("ms_per_step", "ms_per_step", ms), ("99th percentile", "ms_99th", ms), ("ms_detection", "ms_detection", ms),
+        ("ms_deformation", "ms_deformation", ms), ("substeps", "substeps", count),
+        ("force, N", "force_n", lambda force: f"{force:.4f}"), ("building, s", "load_seconds", ratio),
+        ("memory_mb", "memory_mb", count))),
+    "limits": (lambda row: True, (
+        ("deformable", "deformable_triangles", count), ("MB", "bytes", lambda b: f"{1e-6 * b:.2f}"),
+        ("GB/s", "bytes_per_second", lambda b: ratio(1e-9 * b)), ("ms", "ms_of_bytes", lambda t: f"{t:.4f}"),
+        ("million operations", "operations", lambda n: f"{1e-6 * n:.2f}"),
+        ("Gop/s", "operations_per_second", lambda n: ratio(1e-9 * n)), ("ms", "ms_of_operations", lambda t: f"{t:.4f}"),
+        ("measured ms", "ms_deformation", ms), ("times the limit", "times_the_limit", ratio))),
+}
+
+
+def table(bench):
+    wanted, columns = TABLES[bench["bench"]]
+    lines = ["| " + " | ".join(head for head, _, _ in columns) + " |", "|" + "---|" * len(columns)]
+    for row in filter(wanted, bench["rows"]):
+        lines.append("| " + " | ".join(write(row[key]).replace("<", "&lt;") for _, key, write in columns) + " |")
+    return "\n".join(lines) + "\n"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("json", nargs="+", help="of tissue_sim_bench paper or scale")
-    parser.add_argument("--out", required=True, type=pathlib.Path, help="folder for the pictures (SVG)")
+    parser.add_argument("json", nargs="+", help="of tissue_sim_bench paper, peers, scale or limits")
+    parser.add_argument("--out", required=True, type=pathlib.Path,
+                        help="folder for the pictures (SVG) and the tables (performance_<bench>.md)")
     arguments = parser.parse_args()
     plt.rcParams["svg.hashsalt"] = "tissue_sim"  # the same picture for the same numbers, byte for byte
     draw = {"paper": draw_paper, "scale": draw_scale}
     for name in arguments.json:
         with open(name) as file:
             bench = json.load(file)
-        if bench["bench"] not in draw:
-            parser.error(f"{name}: is of tissue_sim_bench {bench['bench']}, of which there is no picture")
-        draw[bench["bench"]](bench["rows"], arguments.out / f"performance_{bench['bench']}.svg")
+        what = bench["bench"]
+        if what not in TABLES:
+            parser.error(f"{name}: is of tissue_sim_bench {what}, allowed is one of {', '.join(TABLES)}")
+        (arguments.out / f"performance_{what}.md").write_text(table(bench))
+        if what in draw:
+            draw[what](bench["rows"], arguments.out / f"performance_{what}.svg")
 
 
 if __name__ == "__main__":

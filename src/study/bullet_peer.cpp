@@ -1,5 +1,3 @@
-#include <chrono>
-
 #include "tissue_sim/study/peers.h"
 
 #ifdef TISSUE_SIM_HAS_BULLET
@@ -114,10 +112,9 @@ std::vector<PeerStep> run_bullet(const PaperTest& test, const BulletSettings& se
   std::vector<PeerStep> steps;
   for (std::size_t i = 1; i < path.size(); ++i) {
     motion.setWorldTransform(transform(paper_pose(path[i])));
-    const auto start = std::chrono::steady_clock::now();
+    const double start = processor_seconds();
     world.stepSimulation(scalar(scene.time_step), 0);
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    steps.push_back({seconds, soft->m_rcontacts.size()});
+    steps.push_back({processor_seconds() - start, soft->m_rcontacts.size()});
   }
   world.removeSoftBody(soft.get());
   world.removeRigidBody(&rigid);
