@@ -111,8 +111,8 @@ INSTANTIATE_TEST_SUITE_P(Tests, PlainStep,
                          testing::Combine(testing::Values(1, 3, 5, 9),
                                           testing::Values(Approach::contact_only, Approach::without_restoration,
                                                           Approach::with_restoration)),
-                         [](const auto& info) {
-                           return std::to_string(std::get<0>(info.param)) + "_" + to_string(std::get<1>(info.param));
+                         [](const auto& test) {
+                           return std::to_string(std::get<0>(test.param)) + "_" + to_string(std::get<1>(test.param));
                          });
 
 TEST(PlainStep, ComparisonSeesAnInstrumentThatIsOneStepBehind) {
