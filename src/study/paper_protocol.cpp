@@ -112,6 +112,23 @@ Scene paper_scene(const PaperTest& test, Approach approach) {
   return scene;
 }
 
+void add(const StepProfile& step, StepProfile& sum) {
+  sum.refit += step.refit;
+  sum.detection += step.detection;
+  sum.penetration += step.penetration;
+  sum.propagation += step.propagation;
+  sum.response += step.response;
+  sum.deformation += step.deformation;
+  sum.health += step.health;
+  sum.total += step.total;
+}
+
+StepProfile divided(const StepProfile& sum, int steps) {
+  const double n = std::max(1, steps);
+  return {sum.refit / n,    sum.detection / n,   sum.penetration / n, sum.propagation / n,
+          sum.response / n, sum.deformation / n, sum.health / n,      sum.total / n};
+}
+
 PaperResult run_paper_test(const PaperTest& test, Approach approach) {
   Timeline timeline(paper_scene(test, approach));
   PaperResult result;
@@ -125,19 +142,11 @@ PaperResult run_paper_test(const PaperTest& test, Approach approach) {
       result.substeps = std::max(result.substeps, report.substeps);
       if (report.contacts.empty()) continue;
       ++result.steps_with_contact;
-      sum.refit += report.profile.refit;
-      sum.detection += report.profile.detection;
-      sum.penetration += report.profile.penetration;
-      sum.propagation += report.profile.propagation;
-      sum.response += report.profile.response;
-      sum.deformation += report.profile.deformation;
-      sum.health += report.profile.health;
-      sum.total += report.profile.total;
+      result.contacts += static_cast<std::int64_t>(report.contacts.size());
+      add(report.profile, sum);
     }
   }
-  const double steps = std::max(1, result.steps_with_contact);
-  result.mean = {sum.refit / steps,    sum.detection / steps,   sum.penetration / steps, sum.propagation / steps,
-                 sum.response / steps, sum.deformation / steps, sum.health / steps,      sum.total / steps};
+  result.mean = divided(sum, result.steps_with_contact);
   result.recoveries = static_cast<int>(timeline.counters().recoveries);
   result.hash = timeline.hash();
   return result;

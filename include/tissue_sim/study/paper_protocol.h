@@ -41,11 +41,16 @@ Pose paper_pose(const Vector3& centre);
 /// 1-6.
 Scene paper_scene(const PaperTest& test, Approach approach);
 
+/// Of profiles over steps: their sum, and that divided by how many there were.
+void add(const StepProfile& step, StepProfile& sum);
+StepProfile divided(const StepProfile& sum, int steps);
+
 struct PaperResult {
   StepProfile mean;  ///< s, over the steps with contact
   int steps_with_contact = 0;
-  int substeps = 0;    ///< the most that a step took
-  int recoveries = 0;  ///< by the health check
+  std::int64_t contacts = 0;  ///< of all steps
+  int substeps = 0;           ///< the most that a step took
+  int recoveries = 0;         ///< by the health check
   std::uint64_t hash = 0;
 };
 PaperResult run_paper_test(const PaperTest& test, Approach approach);

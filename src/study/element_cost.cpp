@@ -1,4 +1,4 @@
-#include "tissue_sim/study/element_bench.h"
+#include "tissue_sim/study/element_cost.h"
 
 #include <algorithm>
 #include <chrono>

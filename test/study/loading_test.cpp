@@ -1,4 +1,4 @@
-#include "tissue_sim/study/load_bench.h"
+#include "tissue_sim/study/loading.h"
 
 #include <gtest/gtest.h>
 
