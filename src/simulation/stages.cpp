@@ -98,7 +98,7 @@ void record_contact(StepContext& context, const ContactPoint& point) {
   contact.triangle = point.triangle;
   contact.barycentric = point.weights;
   contact.direction = point.direction;
-  contact.depth = point.target;  // turned into a depth when the step ends
+  contact.depth = point.target + point.lift;  // turned into a depth when the step ends
   contact.force += context.dt / context.motion.duration * point.force * point.direction;
 }
 
@@ -345,7 +345,7 @@ void respond(StepContext& context) {
   }
   if (work.points.empty()) return;
 
-  if (!rest.embedding.corners.empty()) bear_by(rest.embedding, rest.triangles, work.points);
+  if (!rest.embedding.corners.empty()) bear_by(rest.embedding, rest.triangles, context.state.positions, work.points);
   context.state.asleep = context.state.asleep && !rest.elastic();
   for (ContactPoint& point : work.points) {
     const int instrument = context.world.pieces[point.piece].instrument;
