@@ -84,7 +84,7 @@ void element_forces(const RestShape& rest, const OrganState& state, std::vector<
   }
   if (!(rest.enclosed.stiffness > 0.0)) return;
 
-  const double c = rest.enclosed.evaluate(state.positions, rest.triangles, room.gradient);
+  const double c = rest.enclosed.evaluate(state.positions, rest.wall_triangles(), room.gradient);
   double rate = 0.0;
   for (std::size_t v = 0; v < forces.size(); ++v) rate += room.gradient[v].dot(state.velocities[v]);
   const double pull = rest.enclosed.stiffness * c + rest.enclosed.damping * rate;

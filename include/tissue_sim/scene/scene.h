@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -37,6 +38,8 @@ struct Organ {
   DepthScheme depth = DepthScheme::exact;
   Material material;
   double wall_thickness = 0.0;  ///< m, `surface` only
+  /// Relative error that may be made to simulate less than `mesh` or `solid` have; without, all of it is simulated.
+  std::optional<double> levels_tolerance;
   /// Vertices held at their rest place, ascending: of `solid` where there is one, else of `mesh`.
   std::vector<int> attached;
 };
