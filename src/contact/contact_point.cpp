@@ -104,16 +104,22 @@ void Bearers::add(int vertex, double weight) {
   ++count;
 }
 
-void bear_by(const Embedding& embedding, const std::vector<Triangle>& triangles, std::vector<ContactPoint>& points) {
+void bear_by(const Embedding& embedding, const std::vector<Triangle>& triangles, const std::vector<Vector3>& positions,
+             std::vector<ContactPoint>& points) {
   for (ContactPoint& point : points) {
+    Vector3 place = Vector3::Zero();
     point.bearers.count = 0;
     for (int corner = 0; corner < 3; ++corner) {
       const int vertex = triangles[point.triangle][corner];
       if (point.weights[corner] == 0.0) continue;
+      place += point.weights[corner] * positions[vertex];
       for (int i = 0; i < 4; ++i) {
         point.bearers.add(embedding.corners[vertex][i], point.weights[corner] * embedding.weights[vertex][i]);
       }
     }
+    if (embedding.offsets.empty()) continue;
+    point.lift = point.direction.dot(place - at_point(point, positions));
+    point.target -= point.lift;
   }
 }
 

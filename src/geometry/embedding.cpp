@@ -85,6 +85,60 @@ Host find_nearest(const Vector3& p, const TetrahedralMesh& solid, const AabbTree
   return host;
 }
 
+/// What a point has on a triangle: weights of its foot in the plane, which may be negative, and height above it.
+struct Foot {
+  int triangle = -1;
+  Vector3 weights = Vector3::UnitX();
+  double height = 0.0;
+  double squared_distance = 0.0;
+};
+
+Foot foot_on(const Vector3& p, const TriangleMesh& shell, int triangle) {
+  const auto& [a, b, c] = shell.triangles[triangle];
+  const Vector3& x = shell.vertices[a];
+  const Vector3& y = shell.vertices[b];
+  const Vector3& z = shell.vertices[c];
+  const Vector3 normal = area_normal(x, y, z);
+  const double area2 = normal.squaredNorm();
+  Foot foot;
+  foot.triangle = triangle;
+  foot.squared_distance = (closest_on_triangle(p, x, y, z).point - p).squaredNorm();
+  if (!(area2 > 0.0)) return foot;
+  const double wb = normal.dot((p - x).cross(z - x)) / area2;
+  const double wc = normal.dot((y - x).cross(p - x)) / area2;
+  foot.weights = {1.0 - wb - wc, wb, wc};
+  foot.height = normal.dot(p - x) / std::sqrt(area2);
+  return foot;
+}
+
+/// `facing` is zero where every triangle will do.
+Foot find_foot(const Vector3& p, const Vector3& facing, const TriangleMesh& shell, const AabbTree& tree) {
+  Foot best;
+  const auto faces = [&](int t) {
+    const auto& [a, b, c] = shell.triangles[t];
+    return facing.isZero() || facing.dot(area_normal(shell.vertices[a], shell.vertices[b], shell.vertices[c])) > 0.0;
+  };
+  double nearest = 1e300;
+  tree.for_each_by_distance(p, nearest, [&](int t, double& bound) {
+    if (!faces(t)) return;
+    const Foot foot = foot_on(p, shell, t);
+    if (!(foot.squared_distance < bound)) return;
+    bound = foot.squared_distance;
+    best = foot;
+  });
+  if (best.triangle < 0) return best;
+  const double reach2 = nearest * (1.0 + tie);
+  const Box box = Box{p, p}.grown(std::sqrt(reach2) * (1.0 + tie));
+  tree.for_each_near(box, [&](int t) {
+    if (!faces(t)) return;
+    const Foot foot = foot_on(p, shell, t);
+    if (!(foot.squared_distance <= reach2)) return;
+    const double low = foot.weights.minCoeff(), highest = best.weights.minCoeff();
+    if (low > highest || (low == highest && t < best.triangle)) best = foot;
+  });
+  return best;
+}
+
 }  // namespace
 
 Embedding embed(const std::vector<Vector3>& points, const TetrahedralMesh& solid) {
@@ -104,6 +158,29 @@ Embedding embed(const std::vector<Vector3>& points, const TetrahedralMesh& solid
     embedding.corners.push_back(solid.tetrahedra[std::max(host.tetrahedron, 0)]);
     embedding.weights.push_back(host.weights);
     farthest2 = std::max(farthest2, host.squared_distance);
+  }
+  embedding.farthest_outside = std::sqrt(farthest2);
+  return embedding;
+}
+
+Embedding embed(const std::vector<Vector3>& points, const std::vector<Vector3>& normals, const TriangleMesh& shell) {
+  std::vector<Box> boxes;
+  fit_boxes(shell.vertices, shell.triangles, 0.0, boxes);
+  AabbTree tree;
+  tree.build(boxes);
+  Embedding embedding;
+  embedding.corners.reserve(points.size());
+  embedding.weights.reserve(points.size());
+  embedding.offsets.reserve(points.size());
+  double farthest2 = 0.0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    Foot foot = find_foot(points[i], normals[i], shell, tree);
+    if (foot.triangle < 0) foot = find_foot(points[i], Vector3::Zero(), shell, tree);
+    const auto& [a, b, c] = shell.triangles[std::max(foot.triangle, 0)];
+    embedding.corners.push_back({a, b, c, a});
+    embedding.weights.push_back({foot.weights[0], foot.weights[1], foot.weights[2], 0.0});
+    embedding.offsets.push_back(foot.height);
+    farthest2 = std::max(farthest2, foot.squared_distance);
   }
   embedding.farthest_outside = std::sqrt(farthest2);
   return embedding;

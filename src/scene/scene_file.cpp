@@ -34,6 +34,9 @@ constexpr double smallest_wall_poisson = 1.0 / 3.0;
 /// Distance and volume energies of a solid reach no smaller one.
 constexpr double smallest_volume_poisson = 0.25;
 
+/// The largest error of levels that was measured to be about what it says.
+constexpr double largest_tolerance = 0.3;
+
 /// Of the surface's mean edge: how far a surface may stand out of the solid that is to carry it.
 constexpr double farthest_outside = 3.0;
 
@@ -307,6 +310,17 @@ std::vector<std::string> named_solids(const YamlMapping& yaml, Model model) {
   return {yaml.text("solid")};
 }
 
+std::optional<double> read_levels(const YamlMapping& organ) {
+  if (!organ.has("levels")) return std::nullopt;
+  const YamlMapping yaml = organ.mapping("levels", {"tolerance"});
+  const double tolerance = yaml.fraction("tolerance");
+  if (tolerance > largest_tolerance) {
+    yaml.fail("tolerance",
+              "is '" + yaml.text("tolerance") + "', allowed is at most 30%: beyond it nothing was measured");
+  }
+  return tolerance;
+}
+
 /// What all models of an organ share.
 Organ read_common(const YamlMapping& yaml) {
   Organ organ;
@@ -321,6 +335,7 @@ Organ read_common(const YamlMapping& yaml) {
                                               {"explicit", Integrator::explicit_substeps},
                                               {"vertex_block_descent", Integrator::vertex_block_descent}},
                                              Integrator::automatic);
+  organ.levels_tolerance = read_levels(yaml);
   return organ;
 }
 
@@ -341,6 +356,13 @@ Alternative read_named(const YamlMapping& yaml, std::vector<std::string>& warnin
     organ.wall_thickness = read_wall(yaml);
   } else if (yaml.has("wall_thickness")) {
     yaml.fail("wall_thickness", "is used by the model surface only, delete it");
+  }
+  if (organ.levels_tolerance && organ.model == Model::contact_only) {
+    yaml.fail("levels", "simulates less of an organ, and contact_only simulates none of it: delete it");
+  }
+  if (organ.levels_tolerance && organ.model == Model::volume) {
+    yaml.fail("levels",
+              "is used by the models surface and fem only: delete it, or take fem, which is more accurate too");
   }
   if (organ.model != Model::contact_only || yaml.has("material")) {
     organ.material = read_material(yaml, poisson_range(organ.model));
@@ -477,7 +499,7 @@ Scene load_scene(const std::string& path, std::vector<std::string>& warnings) {
 
   const std::vector<YamlMapping> organs =
       yaml.list("organs", {"name", "mesh", "solid", "scale", "pose", "model", "restoration", "wall_thickness",
-                           "material", "attachments", "colliding_set", "depth", "integrator"});
+                           "material", "attachments", "colliding_set", "depth", "integrator", "levels"});
   const std::vector<YamlMapping> instruments = yaml.list("instruments", {"name", "urdf", "tip_link", "pose_topic"});
   if (organs.empty()) yaml.fail("organs", "is missing or empty, a scene has at least one organ");
   if (instruments.empty()) yaml.fail("instruments", "is missing or empty, a scene has at least one instrument");

@@ -135,7 +135,7 @@ void constraint_forces(const RestShape& rest, const Moving& moving, const Vertic
 void pack_elements(RestShape& rest) {
   const bool surface = !rest.areas.empty() || rest.enclosed.stiffness > 0.0;
   rest.packed = pack(rest.tetrahedra);
-  rest.constraints = pack(rest.distances, rest.areas, rest.volumes, surface ? rest.triangles : std::vector<Triangle>(),
+  rest.constraints = pack(rest.distances, rest.areas, rest.volumes, surface ? rest.wall_triangles() : std::vector<Triangle>(),
                           rest.positions, {rest.inverse_mass, covered_stiffening * rest.stiffest_element});
 }
 

@@ -89,7 +89,7 @@ void record_contact(StepContext& context, const ContactPoint& point) {
   contact.triangle = point.triangle;
   contact.barycentric = point.weights;
   contact.direction = point.direction;
-  contact.depth = point.target;  // turned into a depth when the step ends
+  contact.depth = point.target + point.lift;  // turned into a depth when the step ends
   contact.force += context.dt / context.motion.duration * point.force * point.direction;
 }
 
@@ -371,7 +371,7 @@ void respond(StepContext& context) {
     note_motion(context, wake(context.model(), work.points, context.state, work.levels));
   if (work.points.empty()) return;
 
-  if (!rest.embedding.corners.empty()) bear_by(rest.embedding, rest.triangles, work.points);
+  if (!rest.embedding.corners.empty()) bear_by(rest.embedding, rest.triangles, context.state.positions, work.points);
   if (levels && (context.state.asleep || !all_awake(work.points, context.state))) {
     note_motion(context, wake(context.model(), work.points, context.state, work.levels));
   }

@@ -35,12 +35,13 @@ std::size_t bytes(const FlatLists& lists) {
 }
 
 std::size_t bytes(const RestShape& rest) {
-  return bytes(rest.positions) + bytes(rest.embedding.corners) + bytes(rest.embedding.weights) + bytes(rest.triangles) +
-         bytes(rest.topology.edges) + bytes(rest.topology.edge_triangles) + bytes(rest.topology.triangle_edges) +
-         bytes(rest.topology.vertex_edges) + bytes(rest.topology.vertex_triangles) + bytes(rest.attached) +
-         bytes(rest.mass) + bytes(rest.inverse_mass) + bytes(rest.distances) + bytes(rest.areas) + bytes(rest.volumes) +
-         bytes(rest.tetrahedra) + bytes(rest.packed.batches) + bytes(rest.constraints.pairs) +
-         bytes(rest.constraints.flaps) + bytes(rest.constraints.triangles) + bytes(rest.constraints.distances);
+  return bytes(rest.positions) + bytes(rest.embedding.corners) + bytes(rest.embedding.weights) +
+         bytes(rest.embedding.offsets) + bytes(rest.triangles) + bytes(rest.shell) + bytes(rest.topology.edges) +
+         bytes(rest.topology.edge_triangles) + bytes(rest.topology.triangle_edges) + bytes(rest.topology.vertex_edges) +
+         bytes(rest.topology.vertex_triangles) + bytes(rest.attached) + bytes(rest.mass) + bytes(rest.inverse_mass) +
+         bytes(rest.distances) + bytes(rest.areas) + bytes(rest.volumes) + bytes(rest.tetrahedra) +
+         bytes(rest.packed.batches) + bytes(rest.constraints.pairs) + bytes(rest.constraints.flaps) +
+         bytes(rest.constraints.triangles) + bytes(rest.constraints.distances);
 }
 
 std::size_t bytes(const OrganState& state) {
@@ -288,6 +289,8 @@ OrganSummary Timeline::summary(int organ) const {
   if (rest.elastic()) summary.simulated_vertices = static_cast<int>(rest.positions.size()) - rest.first_simulated;
   summary.tetrahedra = static_cast<int>(rest.tetrahedra.size() + (rest.areas.empty() ? rest.volumes.size() : 0));
   summary.embedded = rest.first_simulated > 0;
+  summary.shell_triangles = static_cast<int>(rest.shell.size());
+  summary.shell_edge = mean_edge_length(rest.positions, rest.shell_topology.edges);
   summary.plastic = rest.elastic() && !model.restoration;
   summary.attached = static_cast<int>(std::count(rest.attached.begin(), rest.attached.end(), 1));
   summary.distance_elements = static_cast<int>(rest.distances.size());

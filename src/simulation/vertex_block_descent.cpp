@@ -73,9 +73,9 @@ Matrix3 inverse_of_symmetric(const Matrix3& a) {
 /// Gradient of the enclosed volume's constraint by one vertex, 1/m: the triangles around it.
 Vector3 enclosed_gradient(const RestShape& rest, int v, const std::vector<Vector3>& positions) {
   Vector3 sum = Vector3::Zero();
-  const FlatLists& triangles = rest.topology.vertex_triangles;
+  const FlatLists& triangles = rest.wall_topology().vertex_triangles;
   for (const int* t = triangles.begin(v); t != triangles.end(v); ++t) {
-    const Triangle& corners = rest.triangles[*t];
+    const Triangle& corners = rest.wall_triangles()[*t];
     const int i = corners[0] == v ? 0 : corners[1] == v ? 1 : 2;
     sum += (positions[corners[(i + 1) % 3]] - positions[v]).cross(positions[corners[(i + 2) % 3]] - positions[v]);
   }
@@ -129,7 +129,7 @@ void Descent::start(const Vector3& gravity) {
   room_.start = state_.positions;
   measure_displacements(rest(), state_.positions, room_);
   if (rest().enclosed.stiffness > 0.0) {
-    enclosed_at_start_ = rest().enclosed.evaluate(state_.positions, rest().triangles, room_.inertial);
+    enclosed_at_start_ = rest().enclosed.evaluate(state_.positions, rest().wall_triangles(), room_.inertial);
     enclosed_ = enclosed_at_start_;
   }
   const double slowed = 1.0 / (1.0 + dt_ * organ_.drag);
@@ -314,7 +314,8 @@ void bearing_forces(const OrganModel& organ, const std::vector<ContactPoint>& po
   const RestShape& rest = organ.rest;
   measure_displacements(rest, state.positions, room);
   const bool encloses = rest.enclosed.stiffness > 0.0;
-  const double enclosed = encloses ? rest.enclosed.evaluate(state.positions, rest.triangles, room.inertial) : 0.0;
+  const double enclosed =
+      encloses ? rest.enclosed.evaluate(state.positions, rest.wall_triangles(), room.inertial) : 0.0;
   constexpr int done = 0;  // vertices bear many points where an organ is folded over an instrument
   for (const ContactPoint& point : points) {
     for (int i = 0; i < point.bearers.count; ++i) {

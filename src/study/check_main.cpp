@@ -9,6 +9,7 @@
 #include "tissue_sim/simulation/accuracy.h"
 #include "tissue_sim/simulation/integrator.h"
 #include "tissue_sim/simulation/press_cost.h"
+#include "tissue_sim/tissue/coarse_shell.h"
 
 namespace {
 
@@ -123,6 +124,18 @@ void print_features(const Organ& organ, const OrganSummary& summary) {
                                      1e3 * summary.substeps * time_passes([&] { carry_surface(alone, positions); })));
 }
 
+/// The level that is simulated in place of a hollow organ's mesh, or why there is none.
+std::string shell_text(const Organ& organ, const OrganSummary& summary) {
+  if (!organ.levels_tolerance) return "off";
+  const double tolerance = 100.0 * *organ.levels_tolerance;
+  if (summary.shell_triangles > 0) {
+    return text("on: %d triangles of %.1f mm, tolerance %.3g %%", summary.shell_triangles, 1e3 * summary.shell_edge,
+                tolerance);
+  }
+  return text("off: a tolerance of %.3g %% allows edges of %.1f mm, hardly longer than those of the mesh", tolerance,
+              1e3 * shell_edge(organ));
+}
+
 void print_organ(const Organ& organ, const OrganSummary& summary) {
   const bool stepped = organ.model != Model::contact_only;
   std::printf("organ %s\n", organ.name.c_str());
@@ -132,6 +145,7 @@ void print_organ(const Organ& organ, const OrganSummary& summary) {
   row("depth", to_string(organ.depth));
   row("mesh", text("%d vertices, %d triangles, %d surface(s)", summary.vertices, summary.triangles,
                    inspect(organ.mesh).components));
+  if (organ.model == Model::surface) row("coarse shell", shell_text(organ, summary));
   row("size", size_text(organ.mesh));
   row("volume", text("%.4g litres", 1000.0 * enclosed_volume(organ.mesh)));
   row("memory", size_of(summary.memory));

@@ -26,7 +26,7 @@ double elastic_energy(const RestShape& rest, const std::vector<Vector3>& positio
   }
   if (rest.enclosed.stiffness > 0.0) {
     std::vector<Vector3> gradient(positions.size());
-    const double c = rest.enclosed.evaluate(positions, rest.triangles, gradient);
+    const double c = rest.enclosed.evaluate(positions, rest.wall_triangles(), gradient);
     energy += 0.5 * rest.enclosed.stiffness * c * c;
   }
   return energy;

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "tissue_sim/geometry/aabb_tree.h"
+#include "tissue_sim/tissue/coarse_shell.h"
 #include "tissue_sim/tissue/solid.h"
 #include "tissue_sim/tissue/stability.h"
 #include "tissue_sim/tissue/wall.h"
@@ -14,6 +16,9 @@ namespace {
 
 /// Of the organ's mass: what the mass floor may add. On a liver-like surface 0.26 % took 108 substeps to 11.
 constexpr double mass_floor = 0.005;
+
+/// Of the tolerance of a coarse shell: the same. At 5 % it took the substeps of a stomach's from 2.8 to 2.4.
+constexpr double shell_mass_floor = 0.5;
 
 std::vector<int> find_component_roots(const MeshTopology& topology, int vertex_count) {
   std::vector<int> roots;
@@ -56,29 +61,48 @@ void damp(double ratio, const RestShape& shape, std::vector<Kind>& elements) {
 
 void damp_enclosed_volume(double ratio, RestShape& shape) {
   std::vector<Vector3> gradient(shape.positions.size());
-  shape.enclosed.evaluate(shape.positions, shape.triangles, gradient);
+  shape.enclosed.evaluate(shape.positions, shape.wall_triangles(), gradient);
   double inverse_mass = 0.0;
-  for (std::size_t i = 0; i < gradient.size(); ++i) inverse_mass += gradient[i].squaredNorm() / shape.mass[i];
+  for (std::size_t i = static_cast<std::size_t>(shape.first_simulated); i < gradient.size(); ++i) {
+    inverse_mass += gradient[i].squaredNorm() / shape.mass[i];
+  }
   shape.enclosed.damping = 2.0 * ratio * std::sqrt(shape.enclosed.stiffness / inverse_mass);
 }
 
-/// The surface, its vertices first; behind it what lies inside, or the whole solid that carries it.
-void place_vertices(const Organ& organ, RestShape& shape) {
-  shape.surface_vertices = static_cast<int>(organ.mesh.vertices.size());
-  shape.positions = organ.mesh.vertices;
-  if (organ.solid.empty()) return;
-  if (!organ.embedded) {
-    shape.positions = organ.solid.vertices;
-    return;
-  }
+/// Puts the vertices of what carries the surface behind the surface's own.
+void add_bearers(const std::vector<Vector3>& vertices, Embedding embedding, RestShape& shape) {
   shape.first_simulated = shape.surface_vertices;
-  shape.embedding = embed(organ.mesh.vertices, organ.solid);
+  shape.embedding = std::move(embedding);
   for (Tetrahedron& corners : shape.embedding.corners) {
     for (int& corner : corners) corner += shape.first_simulated;
   }
-  shape.positions.insert(shape.positions.end(), organ.solid.vertices.begin(), organ.solid.vertices.end());
-  // Rounding left them within a hair of where the mesh has them; what is carried is where the solid carries it.
+  shape.positions.insert(shape.positions.end(), vertices.begin(), vertices.end());
+  // Rounding left them within a hair of where the mesh has them; what is carried is where its bearers carry it.
   carry_surface(shape, shape.positions);
+}
+
+/// The surface, its vertices first; behind it what lies inside, or the whole solid or shell that carries it. Attaches
+/// the simulated vertices that the organ holds.
+void place_vertices(const Organ& organ, RestShape& shape) {
+  shape.surface_vertices = static_cast<int>(organ.mesh.vertices.size());
+  shape.positions = organ.mesh.vertices;
+  std::vector<int> attached = organ.attached;
+  if (organ.embedded) {
+    add_bearers(organ.solid.vertices, embed(organ.mesh.vertices, organ.solid), shape);
+  } else if (!organ.solid.empty()) {
+    shape.positions = organ.solid.vertices;
+  } else if (const CoarseShell coarse = coarse_shell(organ); !coarse.mesh.triangles.empty()) {
+    add_bearers(coarse.mesh.vertices, coarse.embedding, shape);
+    shape.shell = coarse.mesh.triangles;
+    for (Triangle& corners : shape.shell) {
+      for (int& corner : corners) corner += shape.first_simulated;
+    }
+    shape.shell_bending = coarse.bending;
+    shape.shell_topology = build_topology(static_cast<int>(shape.positions.size()), shape.shell);
+    attached = coarse.attached;
+  }
+  shape.attached.assign(shape.positions.size(), 0);
+  for (const int vertex : attached) shape.attached[vertex + shape.first_simulated] = 1;
 }
 
 }  // namespace
@@ -86,8 +110,7 @@ void place_vertices(const Organ& organ, RestShape& shape) {
 double carry_surface(const RestShape& shape, std::vector<Vector3>& positions) {
   double farthest = 0.0;
   for (std::size_t v = 0; v < shape.embedding.corners.size(); ++v) {
-    Vector3 place = Vector3::Zero();
-    for (int i = 0; i < 4; ++i) place += shape.embedding.weights[v][i] * positions[shape.embedding.corners[v][i]];
+    const Vector3 place = embedded_point(shape.embedding, v, positions);
     farthest = std::max(farthest, (place - positions[v]).squaredNorm());
     positions[v] = place;
   }
@@ -102,14 +125,13 @@ RestShape build_rest_shape(const Organ& organ) {
   shape.component_roots = find_component_roots(shape.topology, shape.surface_vertices);
   shape.mean_edge = mean_edge_length(shape.positions, shape.topology.edges);
   shape.size = bounds_of(organ.mesh.vertices).size().norm();
-  shape.attached.assign(shape.positions.size(), 0);
-  for (const int vertex : organ.attached) shape.attached[vertex + shape.first_simulated] = 1;
   shape.mass.assign(shape.positions.size(), organ.model == Model::contact_only ? 1.0 : 0.0);
 
   if (organ.model == Model::surface) add_wall(organ, shape);
   if (is_solid(organ.model)) add_solid(organ, shape);
   if (shape.elastic()) {
-    apply_mass_floor(mass_floor, shape);
+    apply_mass_floor(
+        shape.shell.empty() ? mass_floor : std::max(mass_floor, shell_mass_floor * *organ.levels_tolerance), shape);
     damp(organ.material.damping, shape, shape.distances);
     damp(organ.material.damping, shape, shape.areas);
     damp(organ.material.damping, shape, shape.volumes);

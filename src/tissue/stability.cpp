@@ -236,7 +236,7 @@ void add_enclosed(double factor, const std::vector<Vector3>& gradient, const std
 
 std::vector<Vector3> enclosed_gradient(const RestShape& shape) {
   std::vector<Vector3> gradient(shape.positions.size());
-  if (shape.enclosed.stiffness > 0.0) shape.enclosed.evaluate(shape.positions, shape.triangles, gradient);
+  if (shape.enclosed.stiffness > 0.0) shape.enclosed.evaluate(shape.positions, shape.wall_triangles(), gradient);
   return gradient;
 }
 

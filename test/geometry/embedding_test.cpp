@@ -127,6 +127,83 @@ TEST(Embed, PutsEachVertexOfTheSolidOnItself) {
   EXPECT_LT(embedding.farthest_outside, 1e-14);
 }
 
+/// A shell, and the surface that it was made from: vertices, and normals there.
+struct Shell {
+  TriangleMesh mesh;
+  std::vector<Vector3> points;
+  std::vector<Vector3> normals;
+};
+
+Shell crooked_shell(Random& random) {
+  Shell shell = {make_octasphere(1.0, 2), {}, {}};
+  for (Vector3& v : shell.mesh.vertices) v *= random_in(random, 0.95, 1.05);
+  for (int i = 0; i < 200; ++i) {
+    shell.normals.push_back(random_direction(random));
+    shell.points.push_back(random_in(random, 0.9, 1.1) * shell.normals.back());
+  }
+  return shell;
+}
+
+TEST(EmbedOnShell, AgreesWithLookingAtEveryTriangle) {
+  Random random(11);
+  const Shell shell = crooked_shell(random);
+  const Embedding embedding = embed(shell.points, shell.normals, shell.mesh);
+  double farthest = 0.0;
+  for (std::size_t i = 0; i < shell.points.size(); ++i) {
+    double nearest = 1e300;
+    for (const auto& [a, b, c] : shell.mesh.triangles) {
+      const auto& x = shell.mesh.vertices;
+      if (area_normal(x[a], x[b], x[c]).dot(shell.normals[i]) > 0.0)
+        nearest = std::min(nearest, distance_to_triangle(shell.points[i], x[a], x[b], x[c]));
+    }
+    const auto& [a, b, c, d] = embedding.corners[i];
+    const auto& x = shell.mesh.vertices;
+    EXPECT_NEAR(distance_to_triangle(shell.points[i], x[a], x[b], x[c]), nearest, 1e-12);
+    EXPECT_EQ(d, a);
+    EXPECT_EQ(embedding.weights[i][3], 0.0);
+    EXPECT_LT((embedded_point(embedding, i, x) - shell.points[i]).norm(), 1e-14);
+    farthest = std::max(farthest, nearest);
+  }
+  EXPECT_NEAR(embedding.farthest_outside, farthest, 1e-12);
+}
+
+TEST(EmbedOnShell, FollowsEveryRigidMotionAndStretchAlongATriangle) {
+  Random random(13);
+  const Shell shell = crooked_shell(random);
+  const Embedding embedding = embed(shell.points, shell.normals, shell.mesh);
+  const Pose pose = random_pose(random, 2.0);
+  std::vector<Vector3> moved_vertices = shell.mesh.vertices;
+  for (Vector3& v : moved_vertices) v = pose.apply(v);
+  for (std::size_t i = 0; i < shell.points.size(); ++i) {
+    EXPECT_LT((embedded_point(embedding, i, moved_vertices) - pose.apply(shell.points[i])).norm(), 1e-14);
+  }
+  // Blown up twice as large, what lies above a triangle is as far above it as before.
+  for (Vector3& v : moved_vertices) v *= 2.0;
+  for (std::size_t i = 0; i < shell.points.size(); ++i) {
+    const Vector3 above = embedded_point(embedding, i, moved_vertices) - embedded_foot(embedding, i, moved_vertices);
+    EXPECT_NEAR(above.norm(), std::abs(embedding.offsets[i]), 1e-14);
+  }
+}
+
+TEST(EmbedOnShell, KeepsToTheWallThatFacesTheSameWay) {
+  //   ______ the point is 0.4 below this one, which faces up
+  //   ______ and 0.1 above this one, which faces down
+  TriangleMesh walls = {{{0, 0, 0.5}, {1, 0, 0.5}, {0, 1, 0.5}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}},
+                        {{0, 1, 2}, {3, 5, 4}}};
+  const std::vector<Vector3> points = {{0.2, 0.2, 0.1}};
+  EXPECT_EQ(embed(points, {{0, 0, 1}}, walls).corners[0], (Tetrahedron{0, 1, 2, 0}));
+  EXPECT_NEAR(embed(points, {{0, 0, 1}}, walls).offsets[0], -0.4, 1e-15);
+  EXPECT_EQ(embed(points, {{0, 0, -1}}, walls).corners[0], (Tetrahedron{3, 5, 4, 3}));
+  // Where none does, the nearest of all.
+  EXPECT_EQ(embed(points, {{0, 0, 0}}, walls).corners[0], (Tetrahedron{3, 5, 4, 3}));
+}
+
+TEST(EmbedOnShell, AboveATriangleThatHasCollapsedIsOnIt) {
+  const TriangleMesh shell = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
+  const Embedding embedding = embed({{0.2, 0.3, 0.1}}, {{0, 0, 1}}, shell);
+  EXPECT_EQ(embedded_point(embedding, 0, std::vector<Vector3>(3, Vector3(1, 2, 3))), Vector3(1, 2, 3));
+}
+
 TEST(Embed, ManagesNoPoints) {
   const Embedding embedding = embed({}, make_block({1, 1, 1}, {1, 1, 1}));
   EXPECT_TRUE(embedding.corners.empty());

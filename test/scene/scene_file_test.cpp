@@ -33,6 +33,7 @@ organs:
     restoration: false
     colliding_set: paper
     depth: paper
+    levels: {tolerance: 4%}
     wall_thickness: 0.004
     material: {young: 30000, poisson: 0.45, density: 1060, damping: 0.2, drag: 3}
     attachments:
@@ -96,6 +97,7 @@ TEST(SceneFile, EveryKeyArrives) {
   EXPECT_FALSE(stomach.restoration);
   EXPECT_EQ(stomach.colliding_set, CollidingSet::paper);
   EXPECT_EQ(stomach.depth, DepthScheme::paper);
+  EXPECT_EQ(stomach.levels_tolerance, 0.04);
   EXPECT_EQ(stomach.wall_thickness, 0.004);
   EXPECT_EQ(stomach.material.young, 30000);
   EXPECT_EQ(stomach.material.poisson, 0.45);
@@ -141,6 +143,7 @@ instruments:
   EXPECT_EQ(scene.organs[0].depth, DepthScheme::exact);
   EXPECT_EQ(scene.organs[0].material.damping, 0.1);
   EXPECT_EQ(scene.organs[0].material.drag, 5.0);
+  EXPECT_FALSE(scene.organs[0].levels_tolerance);
   EXPECT_TRUE(scene.organs[0].attached.empty());
   EXPECT_EQ(scene.organs[1].wall_thickness, 0.0);
   EXPECT_EQ(scene.organs[1].material.density, 0.0);

@@ -9,7 +9,7 @@
 namespace tissue_sim {
 
 /// The simulated vertices that a place of the surface moves with, and how much with each: x = sum w_i x_i. The corners
-/// of its triangle, or, where the surface is embedded in a solid, those of the tetrahedra around its corners.
+/// of its triangle, or, where the surface is embedded, those of the tetrahedra or coarse triangles of its corners.
 struct Bearers {
   static constexpr int most = 12;
   int count = 0;
@@ -28,7 +28,8 @@ struct ContactPoint {
   Bearers bearers;
   int poking = -1;                                ///< the instrument's vertex, where one pokes into the triangle
   Vector3 direction = Vector3::UnitZ();           ///< scene frame, unit, out of the instrument
-  double target = 0.0;                            ///< m
+  double target = 0.0;                            ///< m, for the bearers: it shall get `lift` farther itself
+  double lift = 0.0;                              ///< m, along direction, from where the bearers put it to where it is
   Vector3 instrument_velocity = Vector3::Zero();  ///< m/s, of the instrument at the point
   double impulse = 0.0;                           ///< N s along direction, on the organ; set by the response
   double force = 0.0;                             ///< N along direction, on the organ; see bear_forces
@@ -43,8 +44,11 @@ inline Vector3 at_point(const ContactPoint& point, const std::vector<Vector3>& o
   return sum;
 }
 
-/// Of points that were found on a surface that is embedded in a solid: lets the solid's vertices bear them.
-void bear_by(const Embedding& embedding, const std::vector<Triangle>& triangles, std::vector<ContactPoint>& points);
+/// Of points that were found on an embedded surface: lets the vertices of the solid or shell bear them. That a shell's
+/// triangles turn with what lies above them is left out: it changes a point's way by the square of theirs, and the next
+/// pass finds what is left. `positions` are those of the surface and of its bearers.
+void bear_by(const Embedding& embedding, const std::vector<Triangle>& triangles, const std::vector<Vector3>& positions,
+             std::vector<ContactPoint>& points);
 
 /// m; what touches an instrument within this distance goes on touching, and points of triangles are kept this far out.
 constexpr double contact_margin = 0.02e-3;

@@ -52,8 +52,10 @@ struct OrganSummary {
   int triangles = 0;
   int simulated_vertices = 0;  ///< what is integrated: of the surface, of the solid; 0 for contact_only
   int tetrahedra = 0;
-  bool embedded = false;  ///< the surface is carried by the tetrahedra
-  bool plastic = false;   ///< what the instrument moved stays moved
+  bool embedded = false;    ///< the surface is carried by the tetrahedra or by a coarse shell
+  int shell_triangles = 0;  ///< of the coarse shell; 0: there is none
+  double shell_edge = 0.0;  ///< m, its mean edge
+  bool plastic = false;     ///< what the instrument moved stays moved
   int attached = 0;
   int distance_elements = 0;
   int area_elements = 0;

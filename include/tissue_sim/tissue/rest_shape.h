@@ -17,13 +17,16 @@ namespace tissue_sim {
 /// changed.
 struct RestShape {
   /// m, scene frame. First the surface's vertices, which contact works on. Behind them the inner vertices of a solid;
-  /// or, where the surface is embedded, all vertices of the solid that carries it.
+  /// or, where the surface is embedded, all vertices of the solid or the coarse shell that carries it.
   std::vector<Vector3> positions;
   int surface_vertices = 0;
   int first_simulated = 0;  ///< the vertices before it are carried: without mass, moved by `embedding`
   Embedding embedding;      ///< one entry a carried vertex, corners into `positions`
   std::vector<Triangle> triangles;
   MeshTopology topology;
+  std::vector<Triangle> shell;       ///< of the coarse shell that carries the surface, else empty
+  MeshTopology shell_topology;       ///< of the shell; of all vertices, of which the carried ones have no edges
+  double shell_bending = 1.0;        ///< what its bending stiffness is multiplied by, see CoarseShell
   std::vector<int> component_roots;  ///< the first vertex of each connected surface
   double mean_edge = 0.0;            ///< m
   double size = 0.0;                 ///< m, diagonal of the bounding box
@@ -48,6 +51,10 @@ struct RestShape {
   double stiffest_element = 0.0;   ///< 1/s^2, see stiffest_element()
 
   bool elastic() const { return !distances.empty() || !tetrahedra.empty(); }
+
+  /// The triangles that a hollow organ's wall is made of.
+  const std::vector<Triangle>& wall_triangles() const { return shell.empty() ? triangles : shell; }
+  const MeshTopology& wall_topology() const { return shell.empty() ? topology : shell_topology; }
 };
 
 /// Builds what the organ's model asks for, and no more.
