@@ -27,11 +27,11 @@ struct NeoHookeanSolid {
 
 NeoHookeanSolid pack(const std::vector<NeoHookeanElement>& elements);
 
-/// Which registers the forces are computed in: 16 bytes wide, which every x86-64 has (and other processors by the
-/// compiler's own means), or 32, or 32 and twice as many of them. All give the same bits: the lanes do not meet, and
-/// forces are added in the order of the elements. On a Zen 4 core they take 9.4 and 6.5 ns a tetrahedron, and more
-/// registers gain nothing; see constraint_batch.h for the other elements. 64 bytes took 5.8 here and gained nothing
-/// there: too little for a fourth.
+/// Which registers forces are computed in: 16 bytes wide, which every x86-64 has (and other processors by the
+/// compiler's own means), or 32, or with AVX-512 32 and twice as many of them, which distances, areas and volumes have
+/// use for (see constraint_batch.h) and tetrahedra are not compiled for. All give the same bits: the lanes do not meet,
+/// and forces are added in the order of the elements. On a Zen 4 core they take 9.4 and 6.5 ns a tetrahedron; 64 bytes
+/// took 5.8, too little for a third.
 enum class InstructionSet { baseline, avx2, avx512 };
 
 /// Whether this build has code for it and this processor can run it. `baseline` always is.
