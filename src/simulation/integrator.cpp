@@ -49,10 +49,11 @@ __attribute__((always_inline)) inline void write(const FourDoubles& four, Vector
   std::memcpy(vector.data(), &four, sizeof vector);
 }
 
-/// All vertices, or those of a list.
+/// All vertices that are simulated, or those of a list.
 struct EveryVertex {
+  std::size_t first;
   std::size_t count;
-  std::size_t operator[](std::size_t i) const { return i; }
+  std::size_t operator[](std::size_t i) const { return first + i; }
   std::size_t size() const { return count; }
 };
 struct SomeVertices {
@@ -135,8 +136,9 @@ void constraint_forces(const RestShape& rest, const Moving& moving, const Vertic
 void pack_elements(RestShape& rest) {
   const bool surface = !rest.areas.empty() || rest.enclosed.stiffness > 0.0;
   rest.packed = pack(rest.tetrahedra);
-  rest.constraints = pack(rest.distances, rest.areas, rest.volumes, surface ? rest.wall_triangles() : std::vector<Triangle>(),
-                          rest.positions, {rest.inverse_mass, covered_stiffening * rest.stiffest_element});
+  rest.constraints =
+      pack(rest.distances, rest.areas, rest.volumes, surface ? rest.wall_triangles() : std::vector<Triangle>(),
+           rest.positions, {rest.inverse_mass, covered_stiffening * rest.stiffest_element});
 }
 
 void prepare(ElementRoom& room, const RestShape& rest) {
@@ -181,7 +183,8 @@ double stiffening(const RestShape& rest, const FlatLists& tetrahedra_at, const s
 }
 
 void element_forces(const RestShape& rest, const Moving& moving, std::vector<Vector3>& forces, ElementRoom& room) {
-  const EveryVertex vertices = {forces.size()};
+  const auto first = static_cast<std::size_t>(rest.first_simulated);
+  const EveryVertex vertices = {first, forces.size() - first};
   if (!rest.packed.batches.empty()) {
     const auto add = [&](const float* displacements, float* sums) {
       add_neo_hookean_forces(rest.packed, displacements, sums);

@@ -275,15 +275,27 @@ void press_coarser(const OrganModel& model, const std::vector<ContactPoint>& poi
   }
 }
 
+bool moves_less_than_it_shows(const OrganModel& model) {
+  return model.rest.first_simulated > 0 || !model.levels.empty();
+}
+
 void place(const OrganModel& model, const int* first, const int* last, OrganState& state) {
   for (const int* v = first; v != last; ++v) {
-    if (state.region.mark[*v] != Part::asleep) continue;
-    state.positions[*v] = model.rest.positions[*v] + by_coarser(model, 0, *v, state).displacement;
+    if (*v < model.rest.first_simulated) {
+      carry(model.rest, *v, state.positions);
+    } else if (!model.levels.empty() && state.region.mark[*v] == Part::asleep) {
+      state.positions[*v] = model.rest.positions[*v] + by_coarser(model, 0, *v, state).displacement;
+    }
   }
 }
 
+void place(const OrganModel& model, int triangle, OrganState& state) {
+  const Triangle& corners = model.rest.triangles[triangle];
+  if (moves_less_than_it_shows(model)) place(model, corners.data(), corners.data() + corners.size(), state);
+}
+
 void place_surface(const OrganModel& model, OrganState& state) {
-  if (model.levels.empty()) return;
+  if (!moves_less_than_it_shows(model)) return;
   for (int v = 0; v < model.rest.surface_vertices; ++v) place(model, &v, &v + 1, state);
 }
 

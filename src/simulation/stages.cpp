@@ -130,6 +130,11 @@ void keep_forces(StepContext& context) {
   }
 }
 
+void stand_still(OrganState& state) {
+  std::fill(state.velocities.begin(), state.velocities.end(), Vector3::Zero());
+  for (LevelState& level : state.levels) std::fill(level.velocities.begin(), level.velocities.end(), Vector3::Zero());
+}
+
 /// Moves the simulated vertices. Returns the largest speed of one, m/s.
 double integrate_elements(StepContext& context) {
   const OrganModel& model = context.model();
@@ -393,11 +398,10 @@ void deform(StepContext& context) {
   const Lap lap(context.report.profile.deformation);
   const OrganWorkspace& work = context.work();
   const double speed = integrate_elements(context);
-  const double carried = carry_surface(model.rest, context.state.positions);
-  note_motion(context, std::max(context.dt * speed, carried));
+  note_motion(context, context.dt * speed);
   if (work.points.empty() && speed < sleep_speed) {
     context.state.asleep = true;
-    std::fill(context.state.velocities.begin(), context.state.velocities.end(), Vector3::Zero());
+    stand_still(context.state);
   }
 }
 
@@ -423,12 +427,12 @@ void check_health(StepContext& context) {
   OrganWorkspace& work = context.work();
   // What fell asleep in this step is looked at: a position that is not a number has no speed and touches nothing.
   if (context.slept && context.state.asleep && work.contacts.empty()) return;
-  if (healthy(context.model().rest, context.state)) {
-    work.last_good = context.state;
+  if (healthy(context.model(), context.state)) {
+    copy_state(context.model(), context.state, work.last_good);
     return;
   }
-  context.state = work.last_good;
-  std::fill(context.state.velocities.begin(), context.state.velocities.end(), Vector3::Zero());
+  copy_state(context.model(), work.last_good, context.state);
+  stand_still(context.state);
   work.contacts.clear();
   forget(work);
   context.report.recovered = true;
@@ -436,8 +440,13 @@ void check_health(StepContext& context) {
 
 void report_contacts(StepContext& context) {
   OrganWorkspace& work = context.work();
-  std::fill(context.state.depths.begin(), context.state.depths.end(), 0.0);
+  for (const int triangle : context.state.pressed) {
+    for (const int v : context.model().rest.triangles[triangle]) context.state.depths[v] = 0.0;
+  }
+  context.state.pressed.clear();
   for (OrganContact& contact : work.contacts) {
+    context.state.pressed.push_back(contact.triangle);
+    place(context.model(), contact.triangle, context.state);
     const Triangle& corners = context.model().rest.triangles[contact.triangle];
     Vector3 rest = Vector3::Zero();
     contact.point.setZero();

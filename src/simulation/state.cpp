@@ -1,5 +1,6 @@
 #include "tissue_sim/simulation/state.h"
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <cstring>
@@ -57,10 +58,72 @@ std::uint64_t hash_word(std::uint64_t word, std::uint64_t seed) {
   return mixed ^ (mixed >> 32);
 }
 
-std::uint64_t hash_state(const OrganState& organ, std::uint64_t seed) {
-  seed = hash_doubles(organ.positions.front().data(), 3 * organ.positions.size(), seed);
-  seed = hash_doubles(organ.velocities.front().data(), 3 * organ.velocities.size(), seed);
-  return hash_doubles(organ.depths.data(), organ.depths.size(), seed);
+std::uint64_t hash_state(const OrganModel& model, const OrganState& organ, std::uint64_t seed) {
+  const auto first = static_cast<std::size_t>(model.rest.first_simulated);
+  if (!organ.levels.empty()) {
+    for (const int v : organ.region.free) {
+      seed = hash_doubles(organ.positions[v].data(), 3, seed);
+      seed = hash_doubles(organ.velocities[v].data(), 3, seed);
+    }
+    for (const LevelState& level : organ.levels) {
+      seed = hash_doubles(level.positions.front().data(), 3 * level.positions.size(), seed);
+    }
+  } else {
+    const std::size_t count = 3 * (organ.positions.size() - first);
+    seed = hash_doubles(organ.positions[first].data(), count, seed);
+    seed = hash_doubles(organ.velocities[first].data(), count, seed);
+  }
+  if (first == 0 && organ.levels.empty()) return hash_doubles(organ.depths.data(), organ.depths.size(), seed);
+  for (const int triangle : organ.pressed) {
+    for (const int v : model.rest.triangles[triangle]) seed = hash_doubles(&organ.depths[v], 1, seed);
+  }
+  return seed;
+}
+
+namespace {
+
+void copy_region(const ActiveRegion& from, ActiveRegion& to) {
+  for (const int v : to.active.vertices) to.mark[v] = Part::asleep;
+  to.active = from.active;
+  to.free = from.free;
+  to.driven = from.driven;
+  to.band = from.band;
+  for (const int v : to.free) to.mark[v] = Part::free;
+  for (const int v : to.driven) to.mark[v] = Part::driven;
+}
+
+}  // namespace
+
+void copy_state(const OrganModel& model, const OrganState& from, OrganState& to) {
+  if (!from.levels.empty()) {
+    for (const int v : from.region.active.vertices) {
+      to.positions[v] = from.positions[v];
+      to.velocities[v] = from.velocities[v];
+    }
+    copy_region(from.region, to.region);
+    for (std::size_t level = 0; level < from.levels.size(); ++level) {
+      const LevelState& source = from.levels[level];
+      LevelState& copy = to.levels[level];
+      copy.positions = source.positions;
+      copy.velocities = source.velocities;
+      copy.push = source.push;
+      copy.ahead = source.ahead;
+      copy_region(source.region, copy.region);
+    }
+    to.centres = from.centres;
+    to.untouched = from.untouched;
+  } else {
+    const auto first = static_cast<std::ptrdiff_t>(model.rest.first_simulated);
+    std::copy(from.positions.begin() + first, from.positions.end(), to.positions.begin() + first);
+    std::copy(from.velocities.begin() + first, from.velocities.end(), to.velocities.begin() + first);
+  }
+  to.held = from.held;
+  to.colliding = from.colliding;
+  to.touching = from.touching;
+  to.clearances = from.clearances;
+  to.pressing = from.pressing;
+  to.stiffening = from.stiffening;
+  to.asleep = from.asleep;
 }
 
 }  // namespace tissue_sim

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "tissue_sim/simulation/integrator.h"
+#include "tissue_sim/simulation/levels.h"
 #include "tissue_sim/simulation/step.h"
 #include "tissue_sim/tissue/energy.h"
 
@@ -224,8 +225,9 @@ void Timeline::Impl::make_step() {
 
   hash = hash_word(report.step, hash);
   hash = hash_word(static_cast<std::uint64_t>(stamp), hash);
-  for (const OrganState& organ : state.organs) {
-    if (!organ.asleep || !report.contacts.empty()) hash = hash_state(organ, hash);
+  for (std::size_t o = 0; o < state.organs.size(); ++o) {
+    const OrganState& organ = state.organs[o];
+    if (!organ.asleep || !report.contacts.empty()) hash = hash_state(world.organs[o], organ, hash);
   }
 }
 
@@ -233,7 +235,7 @@ void Timeline::Impl::reset_organ(int organ) {
   state.organs[organ] = rest_state(world, organ);
   workspace.organs[organ].last_good = state.organs[organ];
   forget(workspace.organs[organ]);
-  hash = hash_state(state.organs[organ], hash);
+  hash = hash_state(world.organs[organ], state.organs[organ], hash);
   ++counters.resets;
 }
 
@@ -276,7 +278,8 @@ const StepReport& Timeline::report() const {
 }
 
 OrganView Timeline::organ(int index) const {
-  const OrganState& state = impl_->state.organs[index];
+  OrganState& state = impl_->state.organs[index];
+  place_surface(impl_->world.organs[index], state);
   return {{state.positions.data(), state.depths.size()}, {state.depths.data(), state.depths.size()}};
 }
 

@@ -99,7 +99,10 @@ class Simulation {
   }
 
   const RestShape& rest() const { return world_.organs[0].rest; }
-  const Vectors& positions() const { return state_.organs[0].positions; }
+  const Vectors& positions() {
+    place_surface(world_.organs[0], state_.organs[0]);
+    return state_.organs[0].positions;
+  }
   const StepReport& report() const { return report_; }
   const Pose& pose() const { return pose_; }
   /// The instrument's vertices touch the organ's triangles too, which the static reference knows nothing of.

@@ -105,21 +105,41 @@ void place_vertices(const Organ& organ, RestShape& shape) {
   for (const int vertex : attached) shape.attached[vertex + shape.first_simulated] = 1;
 }
 
+/// A foot goes by its weights. What lies above a triangle swings with its normal, which turns by the way of a corner
+/// over a height of the triangle; twice that, for triangles that have been squeezed.
+double carried_way(const RestShape& shape) {
+  double farthest = 1.0;
+  const Embedding& embedding = shape.embedding;
+  for (std::size_t v = 0; v < embedding.corners.size(); ++v) {
+    double way = 0.0;
+    for (const double weight : embedding.weights[v]) way += std::abs(weight);
+    if (!embedding.offsets.empty()) {
+      const Tetrahedron& t = embedding.corners[v];
+      const Vector3& a = shape.positions[t[0]];
+      const Vector3& b = shape.positions[t[1]];
+      const Vector3& c = shape.positions[t[2]];
+      const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
+      way += 4.0 * std::abs(embedding.offsets[v]) * longest / area_normal(a, b, c).norm();
+    }
+    farthest = std::max(farthest, way);
+  }
+  return farthest;
+}
+
 }  // namespace
 
-double carry_surface(const RestShape& shape, std::vector<Vector3>& positions) {
-  double farthest = 0.0;
-  for (std::size_t v = 0; v < shape.embedding.corners.size(); ++v) {
-    const Vector3 place = embedded_point(shape.embedding, v, positions);
-    farthest = std::max(farthest, (place - positions[v]).squaredNorm());
-    positions[v] = place;
-  }
-  return std::sqrt(farthest);
+void carry(const RestShape& shape, int vertex, std::vector<Vector3>& positions) {
+  positions[vertex] = embedded_point(shape.embedding, static_cast<std::size_t>(vertex), positions);
+}
+
+void carry_surface(const RestShape& shape, std::vector<Vector3>& positions) {
+  for (int v = 0; v < shape.first_simulated; ++v) carry(shape, v, positions);
 }
 
 RestShape build_rest_shape(const Organ& organ) {
   RestShape shape;
   place_vertices(organ, shape);
+  shape.carried_way = carried_way(shape);
   shape.triangles = organ.mesh.triangles;
   shape.topology = build_topology(shape.surface_vertices, shape.triangles);
   shape.component_roots = find_component_roots(shape.topology, shape.surface_vertices);

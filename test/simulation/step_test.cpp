@@ -27,7 +27,7 @@ Simulation pressed_sphere(double depth, int steps) {
 }
 
 std::uint64_t hash(const Simulation& simulation) {
-  return hash_state(simulation.organ(), 1);
+  return simulation.hash();
 }
 
 TEST(Step, TwoRunsGiveTheSameBits) {

@@ -81,7 +81,12 @@ struct Simulation {
     poses[0] = pose;
   }
 
-  const OrganState& organ() const { return state.organs.front(); }
+  /// With its whole surface in place.
+  const OrganState& organ() {
+    place_surface(world.organs.front(), state.organs.front());
+    return state.organs.front();
+  }
+  std::uint64_t hash() const { return hash_state(world.organs.front(), state.organs.front(), 1); }
   const RestShape& rest() const { return world.organs.front().rest; }
 
   World world;

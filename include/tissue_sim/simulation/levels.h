@@ -39,11 +39,15 @@ void follow_coarser(const OrganModel& model, double dt, OrganState& state);
 /// Hands the impulses of the contact points to the coarser levels.
 void press_coarser(const OrganModel& model, const std::vector<ContactPoint>& points, OrganState& state);
 
-/// Puts vertices of the organ (first .. last - 1 are their numbers) that are asleep where the levels have them. Those
-/// that are awake stay.
+/// Whether the step leaves surface vertices where they are although the organ has moved: those that a solid or a shell
+/// carries, and those that are asleep.
+bool moves_less_than_it_shows(const OrganModel& model);
+
+/// Puts such vertices (first .. last - 1 are their numbers) where they are now.
 void place(const OrganModel& model, const int* first, const int* last, OrganState& state);
 
-/// The same for the whole surface.
+/// The same for the corners of a triangle, and for the whole surface.
+void place(const OrganModel& model, int triangle, OrganState& state);
 void place_surface(const OrganModel& model, OrganState& state);
 
 }  // namespace tissue_sim

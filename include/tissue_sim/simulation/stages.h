@@ -21,7 +21,7 @@ struct StepContext {
   OrganWorkspace& work() { return workspace.organs[organ]; }
   /// Of surface vertices that the step does not move: contact asks for those it looks at.
   Placement placement() {
-    if (model().levels.empty()) return {};
+    if (!moves_less_than_it_shows(model())) return {};
     const auto place_some = [](void* context, const int* first, const int* last) {
       StepContext& here = *static_cast<StepContext*>(context);
       place(here.model(), first, last, here.state);

@@ -32,6 +32,7 @@ struct OrganState {
   std::vector<Vector3> positions;             ///< m, scene frame, in the order of the rest shape's
   std::vector<Vector3> velocities;            ///< m/s
   std::vector<Vector3> forces;                ///< N, of the elements in the last substep
+  std::vector<int> pressed;                   ///< triangles whose corners have a depth
   std::vector<double> depths;                 ///< m, one a surface vertex, 0 where no instrument presses
   std::vector<char> held;                     ///< 1: moved by an instrument and left there; empty with restoration
   std::vector<std::vector<char>> colliding;   ///< per piece, one a vertex: the paper's memory; empty for the flood
@@ -57,7 +58,11 @@ State rest_state(const World& world);
 OrganState rest_state(const World& world, int organ);
 
 /// A number that differs when any bit of what an organ shows or moves by differs: positions, velocities, depths.
-std::uint64_t hash_state(const OrganState& organ, std::uint64_t seed);
+std::uint64_t hash_state(const OrganModel& model, const OrganState& organ, std::uint64_t seed);
 std::uint64_t hash_word(std::uint64_t word, std::uint64_t seed);
+
+/// Copies what the next step reads, between two states of one organ. With levels that is what is awake: the time
+/// follows the contact.
+void copy_state(const OrganModel& model, const OrganState& from, OrganState& to);
 
 }  // namespace tissue_sim

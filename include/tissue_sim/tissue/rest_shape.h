@@ -20,8 +20,9 @@ struct RestShape {
   /// or, where the surface is embedded, all vertices of the solid or the coarse shell that carries it.
   std::vector<Vector3> positions;
   int surface_vertices = 0;
-  int first_simulated = 0;  ///< the vertices before it are carried: without mass, moved by `embedding`
-  Embedding embedding;      ///< one entry a carried vertex, corners into `positions`
+  int first_simulated = 0;   ///< the vertices before it are carried: without mass, moved by `embedding`
+  Embedding embedding;       ///< one entry a carried vertex, corners into `positions`
+  double carried_way = 1.0;  ///< how far a carried vertex goes at most when no bearer goes farther than 1
   std::vector<Triangle> triangles;
   MeshTopology topology;
   std::vector<Triangle> shell;       ///< of the coarse shell that carries the surface, else empty
@@ -60,7 +61,8 @@ struct RestShape {
 /// Builds what the organ's model asks for, and no more.
 RestShape build_rest_shape(const Organ& organ);
 
-/// Puts the carried vertices where their bearers are. Returns the farthest way of one, m.
-double carry_surface(const RestShape& shape, std::vector<Vector3>& positions);
+/// Puts a carried vertex, or all of them, where their bearers are.
+void carry(const RestShape& shape, int vertex, std::vector<Vector3>& positions);
+void carry_surface(const RestShape& shape, std::vector<Vector3>& positions);
 
 }  // namespace tissue_sim
