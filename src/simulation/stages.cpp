@@ -20,10 +20,6 @@ constexpr int most_motion_substeps = 300;
 /// micrometre.
 constexpr double sleep_speed = 1e-7;
 
-/// Contacts of a step that are made room for from the start: more than a tool makes, so that a warm step allocates
-/// nothing.
-constexpr std::size_t usual_contacts = 256;
-
 /// Adds the time from here to the end of the scope to a stage of the profile.
 class Lap {
  public:

@@ -41,6 +41,8 @@ OrganState rest_state(const World& world, int organ) {
   state.touching.resize(world.pieces.size());
   for (const InstrumentPiece& piece : world.pieces) state.clearances.emplace_back(piece.surface.vertices.size());
   if (!model.levels.empty()) rest_levels(model, world.pieces.size(), state);
+  state.pressing.reserve(usual_contacts);
+  state.pressed.reserve(usual_contacts);
   state.asleep = world.gravity.isZero();
   return state;
 }

@@ -173,8 +173,8 @@ double relative_difference(const RestShape& rest, const std::vector<Vector3>& a,
 
 TEST(SolidIntegrators, AgreeAtRest) {
   for (const Model model : {Model::fem, Model::volume}) {
-    const Simulation one = pressed(soft_block(model, 4, Integrator::explicit_substeps));
-    const Simulation other = pressed(soft_block(model, 4, Integrator::vertex_block_descent), 800);
+    Simulation one = pressed(soft_block(model, 4, Integrator::explicit_substeps));
+    Simulation other = pressed(soft_block(model, 4, Integrator::vertex_block_descent), 800);
     EXPECT_LT(relative_difference(one.rest(), other.organ().positions, one.organ().positions), 2e-3);
     const Vector3& force = one.report.wrenches[0].force;
     EXPECT_LT((other.report.wrenches[0].force - force).norm(), 2e-3 * force.norm())

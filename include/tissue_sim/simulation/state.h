@@ -9,6 +9,10 @@
 
 namespace tissue_sim {
 
+/// Contacts of a step that are made room for from the start: more than a tool makes, so that a warm step allocates
+/// nothing.
+constexpr std::size_t usual_contacts = 256;
+
 /// What was found at a place of contact in the last substep: the next one starts from it.
 struct PlaceForce {
   std::size_t place = 0;
