@@ -1,6 +1,8 @@
 #include "tissue_sim/contact/detection.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "tissue_sim/geometry/edge_triangle.h"
 
@@ -26,14 +28,42 @@ void set_side(Detection& d, int vertex, Side side) {
   current = current == Side::unknown || current == side ? side : Side::contradicted;
 }
 
+/// m; more than the tie break and rounding move a vertex by.
+constexpr double clear_margin = 1e-8;
+
+/// Of a patch's radius: how far it moves at least before its distance from the instrument is asked for again.
+constexpr double ask_again = 0.1;
+
+/// Whether the instrument's surface is nowhere in the ball that holds a patch. The distance of its middle from the
+/// instrument grows and shrinks by no more than the middle's way in the tip frame, so it is computed only when that way
+/// could have changed the answer.
+bool is_clear(const InstrumentSurface& instrument, const Vector3& middle, double radius, FreeBall& ball) {
+  const double way = (middle - ball.centre).norm();
+  if (ball.radius - way > radius) return true;
+  const double to_change = std::max(std::abs(ball.radius - radius), ask_again * radius);
+  if (ball.radius >= 0.0 && !(way > to_change)) return false;
+  const ClosestOnMesh closest = closest_on_mesh(instrument.vertices, instrument.triangles, instrument.tree, middle,
+                                                std::numeric_limits<double>::max(), ball.triangle);
+  if (closest.triangle < 0) return false;
+  ball = {middle, std::sqrt(closest.squared_distance), closest.triangle};
+  return ball.radius > radius;
+}
+
 /// Pairs of organ edges and instrument triangles that may cross.
 void gather_pairs(const OrganSurface& organ, const InstrumentSurface& instrument, const Pose& pose, Detection& d) {
   d.pairs.clear();
   const FlatLists& vertices = organ.patches.vertices;
   const FlatLists& edges = organ.patches.edges;
+  const Eigen::Quaterniond back = pose.orientation.conjugate();
   for_each_patch_near(organ, scene_bounds(instrument.bounds, pose), [&](int patch) {
+    const Box& box = organ.patches.nodes[organ.patches.leaf_of[patch]].box;
+    const Vector3 middle = back * (0.5 * (box.lower + box.upper) - pose.position);
+    if (is_clear(instrument, middle, 0.5 * box.size().norm() + clear_margin, d.free_balls[patch])) return;
     for (const int* v = vertices.begin(patch); v != vertices.end(patch); ++v) {
-      d.local_rounded[*v] = to_float(local_position(d, organ, pose, *v));
+      if (d.local_stamp[*v] == d.stamp) continue;
+      d.local_stamp[*v] = d.stamp;
+      d.local[*v] = back * (organ.positions[*v] - pose.position) + tie_break;  // as local_position()
+      d.local_rounded[*v] = to_float(d.local[*v]);
     }
     const auto count = static_cast<std::size_t>(edges.end(patch) - edges.begin(patch));
     find_crossing_pairs(instrument.tree, d.local_rounded, organ.topology.edges, edges.begin(patch), count, d.tree_room,
@@ -159,6 +189,7 @@ void flood(const OrganSurface& organ, const InstrumentSurface& instrument, const
   });
   d.vertex_set.drain_to(d.stack);
   for (const int vertex : d.stack) {
+    local_position(d, organ, pose, vertex);
     if (decide_by_closest_feature(instrument, d, vertex) == Side::inside) d.colliding.push_back(vertex);
   }
 }
@@ -185,6 +216,7 @@ void prepare(Detection& d, const OrganSurface& organ) {
   d.edge_stamp.assign(edges, 0);
   d.crossed_edge_of.assign(edges, -1);
   d.nearest.assign(vertices, -1);
+  d.free_balls.assign(organ.patches.leaf_of.size(), FreeBall());
   d.local_rounded.assign(vertices, FloatPoint());
   d.edge_set.prepare(edges);
   d.vertex_set.prepare(vertices);
@@ -202,6 +234,7 @@ const Vector3& local_position(Detection& d, const OrganSurface& organ, const Pos
     place_vertex(organ, vertex);
     d.local_stamp[vertex] = d.stamp;
     d.local[vertex] = pose.apply_inverse(organ.positions[vertex]) + tie_break;
+    d.local_rounded[vertex] = to_float(d.local[vertex]);
   }
   return d.local[vertex];
 }

@@ -9,14 +9,15 @@ namespace {
 /// Of the product of its three lengths: below this a side is rounding error.
 constexpr double rounding = 1e-15;
 
-/// +1 or -1: the side on which the line p + s * along passes the rim from corner a to corner b. A line through the rim
-/// is taken to pass where it would after a small shift by (d, d^2, d^3): the rims of a corner then agree, so that a
-/// line through a corner hits one of its triangles and not none or three.
-int side_of_rim(const Vector3& p, const Vector3& along, const Vector3& a, const Vector3& b, bool ascending) {
-  const Vector3 to_low = (ascending ? a : b) - p;
-  const Vector3 to_high = (ascending ? b : a) - p;
+/// +1 or -1: the side on which the line along `along` passes the rim from corner a to corner b, which are seen from a
+/// point of the line. A line through the rim is taken to pass where it would after a small shift by (d, d^2, d^3): the
+/// rims of a corner then agree, so that a line through a corner hits one of its triangles and not none or three.
+inline int side_of_rim(const Vector3& along, double along_squared, const Vector3& to_a, const Vector3& to_b,
+                       bool ascending) {
+  const Vector3& to_low = ascending ? to_a : to_b;
+  const Vector3& to_high = ascending ? to_b : to_a;
   double side = along.dot(to_low.cross(to_high));
-  const double squares = along.squaredNorm() * to_low.squaredNorm() * to_high.squaredNorm();
+  const double squares = along_squared * to_low.squaredNorm() * to_high.squaredNorm();
   if (side * side <= rounding * rounding * squares) {
     const Vector3 by_shift = along.cross(to_high - to_low);
     side = by_shift.x() != 0.0 ? by_shift.x() : by_shift.y() != 0.0 ? by_shift.y() : by_shift.z();
@@ -37,9 +38,13 @@ EdgeTriangleHit hit_edge_triangle(const Vector3& p, const Vector3& q, const std:
   if ((height_p < 0.0) == (height_q < 0.0)) return {};
 
   const Vector3 along = q - p;
-  const int side = side_of_rim(p, along, a, b, indices[0] < indices[1]);
-  if (side != side_of_rim(p, along, b, c, indices[1] < indices[2])) return {};
-  if (side != side_of_rim(p, along, c, a, indices[2] < indices[0])) return {};
+  const double squared = along.squaredNorm();
+  const Vector3 to_a = a - p;
+  const Vector3 to_b = b - p;
+  const Vector3 to_c = c - p;
+  const int side = side_of_rim(along, squared, to_a, to_b, indices[0] < indices[1]);
+  if (side != side_of_rim(along, squared, to_b, to_c, indices[1] < indices[2])) return {};
+  if (side != side_of_rim(along, squared, to_c, to_a, indices[2] < indices[0])) return {};
 
   const double t = height_p / (height_p - height_q);
   if (!(t >= 0.0 && t <= 1.0)) return {};

@@ -15,14 +15,13 @@ namespace tissue_sim {
 
 namespace {
 
-// Arithmetic lane by lane in whatever registers the function has that they are inlined into.
-using Four = float __attribute__((vector_size(16)));
-using Eight = float __attribute__((vector_size(32)));
-using FourBits = int __attribute__((vector_size(16)));
+// Arithmetic lane by lane, from and to plain arrays, in whatever registers the function has that they are inlined into.
+typedef float Four __attribute__((vector_size(16), aligned(4), may_alias));   // NOLINT(modernize-use-using)
+typedef float Eight __attribute__((vector_size(32), aligned(4), may_alias));  // NOLINT(modernize-use-using)
+using FourBits = int __attribute__((vector_size(16), may_alias));
 using EightBits = int __attribute__((vector_size(32)));
 
 constexpr std::size_t lanes = WideTree::lanes;
-constexpr unsigned all_lanes = (1U << lanes) - 1U;
 constexpr float infinite = std::numeric_limits<float>::infinity();
 
 /// More leaves than this near to a group of edges: each of them goes down the tree by itself.
@@ -50,27 +49,21 @@ TISSUE_SIM_INLINE const Lane& lane(const WideTree::Row& row, std::size_t first) 
   return *reinterpret_cast<const Lane*>(row.data() + first);
 }
 
-struct FloatBox {
-  std::array<float, 3> lower{infinite, infinite, infinite};
-  std::array<float, 3> upper{-infinite, -infinite, -infinite};
-
-  void add(const FloatPoint& p) {
-    for (std::size_t i = 0; i < 3; ++i) {
-      lower[i] = std::min(lower[i], p[i]);
-      upper[i] = std::max(upper[i], p[i]);
-    }
-  }
-};
+TISSUE_SIM_INLINE Four& four(FloatPoint& p) {
+  return *reinterpret_cast<Four*>(p.data());
+}
+TISSUE_SIM_INLINE const Four& four(const FloatPoint& p) {
+  return *reinterpret_cast<const Four*>(p.data());
+}
 
 /// The children whose boxes overlap `box`, a bit each. A NaN overlaps nothing.
 template <class Lane>
-TISSUE_SIM_INLINE unsigned overlapping(const WideTree::Node& node, const FloatBox& box) {
+TISSUE_SIM_INLINE unsigned overlapping(const WideTree::Node& node, const FloatPoint& lower, const FloatPoint& upper) {
   unsigned bits = 0;
   for (std::size_t l = 0; l < lanes; l += sizeof(Lane) / sizeof(float)) {
-    const auto overlap =
-        (lane<Lane>(node.lower[0], l) <= box.upper[0]) & (lane<Lane>(node.upper[0], l) >= box.lower[0]) &
-        (lane<Lane>(node.lower[1], l) <= box.upper[1]) & (lane<Lane>(node.upper[1], l) >= box.lower[1]) &
-        (lane<Lane>(node.lower[2], l) <= box.upper[2]) & (lane<Lane>(node.upper[2], l) >= box.lower[2]);
+    const auto overlap = (lane<Lane>(node.lower[0], l) <= upper[0]) & (lane<Lane>(node.upper[0], l) >= lower[0]) &
+                         (lane<Lane>(node.lower[1], l) <= upper[1]) & (lane<Lane>(node.upper[1], l) >= lower[1]) &
+                         (lane<Lane>(node.lower[2], l) <= upper[2]) & (lane<Lane>(node.upper[2], l) >= lower[2]);
     bits |= bits_of(overlap) << l;
   }
   return bits;
@@ -96,21 +89,43 @@ TISSUE_SIM_INLINE void cross(const Three<Lane>& a, const Three<Lane>& b, Three<L
   product.z = a.x * b.y - a.y * b.x;
 }
 
-/// The triangles of a leaf that the edge p-q may cross, of those whose boxes overlap the edge's: p and q do not surely
-/// lie on one side of the plane, and the line does not surely pass two rims on different sides.
+/// The triangles of a leaf whose planes the edge p-q may go through: its ends do not surely lie on one side.
 ///
-/// `unsure` bounds the errors: coordinates up to `farthest` are rounded, so the differences below, up to `length` long,
-/// are wrong by 3 farthest * rounding each, and what is made of them by less than farthest * length * (54 * along + 72
-/// * length) * rounding, where `along` bounds the sides of q - p; three rims together by three times that.
+/// Coordinates up to `farthest`, the normal and all sums of their products are rounded: a height is wrong by less than
+/// 16 farthest * rounding.
 template <class Lane>
-TISSUE_SIM_INLINE unsigned crossable(const WideTree::Leaf& leaf, const FloatPoint& p, const FloatPoint& q,
+TISSUE_SIM_INLINE unsigned straddled(const WideTree::Leaf& leaf, const FloatPoint& p, const FloatPoint& q,
                                      float farthest) {
+  const float unsure = 32.0F * rounding * farthest;
+  unsigned bits = 0;
+  for (std::size_t l = 0; l < lanes; l += sizeof(Lane) / sizeof(float)) {
+    const Lane& x = lane<Lane>(leaf.normal[0], l);
+    const Lane& y = lane<Lane>(leaf.normal[1], l);
+    const Lane& z = lane<Lane>(leaf.normal[2], l);
+    const Lane height_p = x * p[0] + y * p[1] + z * p[2] - lane<Lane>(leaf.offset, l);
+    const Lane height_q = x * q[0] + y * q[1] + z * q[2] - lane<Lane>(leaf.offset, l);
+    const auto both_above = (height_p > unsure) & (height_q > unsure);
+    const auto both_below = (height_p < -unsure) & (height_q < -unsure);
+    bits |= bits_of(~(both_above | both_below)) << l;
+  }
+  return bits;
+}
+
+/// The triangles of a leaf, of those whose boxes overlap the edge's, whose rims the line p-q does not surely pass on
+/// different sides.
+///
+/// Coordinates up to `farthest` are rounded, so the differences below, up to `length` long, are wrong by 3 farthest *
+/// rounding each, and what is made of them by less than farthest * length * (54 * along + 24 * length) * rounding,
+/// where `along` bounds the sides of q - p.
+template <class Lane>
+TISSUE_SIM_INLINE unsigned within_rims(const WideTree::Leaf& leaf, const FloatPoint& p, const FloatPoint& q,
+                                       float farthest) {
   const float x = q[0] - p[0];
   const float y = q[1] - p[1];
   const float z = q[2] - p[2];
   const float along = std::max(std::abs(x), std::max(std::abs(y), std::abs(z)));
   const float length = along + leaf.extent;
-  const float unsure = rounding * farthest * length * (256.0F * along + 256.0F * length);
+  const float unsure = rounding * farthest * length * (128.0F * along + 64.0F * length);
   unsigned bits = 0;
   for (std::size_t l = 0; l < lanes; l += sizeof(Lane) / sizeof(float)) {
     Three<Lane> a, b, c, ab, bc, ca;
@@ -123,27 +138,23 @@ TISSUE_SIM_INLINE unsigned crossable(const WideTree::Leaf& leaf, const FloatPoin
     const Lane rim_a = ab.x * x + ab.y * y + ab.z * z;
     const Lane rim_b = bc.x * x + bc.y * y + bc.z * z;
     const Lane rim_c = ca.x * x + ca.y * y + ca.z * z;
-    const Lane below_p = a.x * bc.x + a.y * bc.y + a.z * bc.z;  // minus the height of p over the plane
-    const Lane below_q = below_p - (rim_a + rim_b + rim_c);
     const auto some_left = (rim_a > unsure) | (rim_b > unsure) | (rim_c > unsure);
     const auto some_right = (rim_a < -unsure) | (rim_b < -unsure) | (rim_c < -unsure);
-    const auto both_below = (below_p > unsure) & (below_q > unsure);
-    const auto both_above = (below_p < -unsure) & (below_q < -unsure);
-    bits |= bits_of(~((some_left & some_right) | both_below | both_above)) << l;
+    bits |= bits_of(~(some_left & some_right)) << l;
   }
   return bits;
 }
 
 /// Calls visit(node, lane) for the nodes that are leaves and overlap the box.
 template <class Lane, class Visit>
-TISSUE_SIM_INLINE void for_each_leaf(const WideTree& tree, const FloatBox& box, std::vector<int>& stack,
-                                     Visit&& visit) {
+TISSUE_SIM_INLINE void for_each_leaf(const WideTree& tree, const FloatPoint& lower, const FloatPoint& upper,
+                                     std::vector<int>& stack, Visit&& visit) {
   stack.clear();
   stack.push_back(0);
   while (!stack.empty()) {
     const WideTree::Node& node = tree.nodes[static_cast<std::size_t>(stack.back())];
     stack.pop_back();
-    for (unsigned bits = overlapping<Lane>(node, box); bits != 0; bits &= bits - 1) {
+    for (unsigned bits = overlapping<Lane>(node, lower, upper); bits != 0; bits &= bits - 1) {
       const auto l = static_cast<std::size_t>(__builtin_ctz(bits));
       const int child = node.child[l];
       if (tree.nodes[static_cast<std::size_t>(child)].leaf >= 0) {
@@ -165,10 +176,11 @@ void clear(WideTree::Node& node) {
 
 /// Boxes of the leaves near to all the edges. False: there are too many of them.
 template <class Lane>
-TISSUE_SIM_INLINE bool gather_leaves(const WideTree& tree, const FloatBox& box, WideTreeRoom& room) {
+TISSUE_SIM_INLINE bool gather_leaves(const WideTree& tree, const FloatPoint& lower, const FloatPoint& upper,
+                                     WideTreeRoom& room) {
   room.leaves.clear();
   room.near.clear();
-  for_each_leaf<Lane>(tree, box, room.stack, [&](const WideTree::Node& node, std::size_t from) {
+  for_each_leaf<Lane>(tree, lower, upper, room.stack, [&](const WideTree::Node& node, std::size_t from) {
     const std::size_t to = room.leaves.size() % lanes;
     if (to == 0) {
       room.near.emplace_back();
@@ -188,39 +200,78 @@ template <class Lane>
 TISSUE_SIM_INLINE void find_pairs(const WideTree& tree, const std::vector<FloatPoint>& points,
                                   const std::vector<Edge>& edges, const int* chosen, std::size_t count,
                                   WideTreeRoom& room, std::vector<EdgeTrianglePair>& pairs) {
-  FloatBox all;
-  for (std::size_t e = 0; e < count; ++e) {
-    for (const int v : edges[static_cast<std::size_t>(chosen[e])]) all.add(points[static_cast<std::size_t>(v)]);
-  }
-  const bool few = gather_leaves<Lane>(tree, all, room);
-  if (room.leaves.empty()) return;
-  float farthest = tree.farthest;
-  for (std::size_t i = 0; i < 3; ++i) farthest = std::max({farthest, std::abs(all.lower[i]), std::abs(all.upper[i])});
-
+  if (room.edges.size() < count) room.edges.resize(count);
+  Four lower = Four{} + infinite;
+  Four upper = Four{} - infinite;
   for (std::size_t e = 0; e < count; ++e) {
     const Edge& edge = edges[static_cast<std::size_t>(chosen[e])];
-    const FloatPoint& p = points[static_cast<std::size_t>(edge[0])];
-    const FloatPoint& q = points[static_cast<std::size_t>(edge[1])];
-    FloatBox box;
-    box.add(p);
-    box.add(q);
-    const auto look_at = [&](const WideTree::Node& node, std::size_t l) __attribute__((always_inline)) {
-      const WideTree::Node& leaf = tree.nodes[static_cast<std::size_t>(node.child[l])];
-      unsigned bits = overlapping<Lane>(leaf, box);
-      if (bits == 0) return;
-      bits &= crossable<Lane>(tree.leaves[static_cast<std::size_t>(leaf.leaf)], p, q, farthest);
-      for (; bits != 0; bits &= bits - 1) {
-        pairs.push_back({chosen[e], leaf.child[static_cast<std::size_t>(__builtin_ctz(bits))]});
-      }
-    };
+    const Four p = four(points[static_cast<std::size_t>(edge[0])]);
+    const Four q = four(points[static_cast<std::size_t>(edge[1])]);
+    const Four low = p < q ? p : q;
+    const Four high = p < q ? q : p;
+    lower = low < lower ? low : lower;
+    upper = high > upper ? high : upper;
+    FloatEdge& kept = room.edges[e];
+    four(kept.p) = p;
+    four(kept.q) = q;
+    four(kept.lower) = low;
+    four(kept.upper) = high;
+  }
+  FloatPoint all_lower;
+  FloatPoint all_upper;
+  four(all_lower) = lower;
+  four(all_upper) = upper;
+  const bool few = gather_leaves<Lane>(tree, all_lower, all_upper, room);
+  if (room.leaves.empty()) return;
+  float farthest = tree.farthest;
+  for (std::size_t i = 0; i < 3; ++i) farthest = std::max({farthest, std::abs(all_lower[i]), std::abs(all_upper[i])});
+
+  // In passes, each over what the one before has left, since no one can guess what a test will say: writing down every
+  // visit and counting on only where it is kept takes no branch.
+  std::vector<EdgeLeafVisit>& visits = room.visits;
+  std::size_t kept = 0;
+  for (int e = 0; e < static_cast<int>(count); ++e) {
+    const FloatEdge& edge = room.edges[static_cast<std::size_t>(e)];
     if (!few) {
-      for_each_leaf<Lane>(tree, box, room.stack, look_at);
+      for_each_leaf<Lane>(tree, edge.lower, edge.upper, room.stack, [&](const WideTree::Node& node, std::size_t l) {
+        if (visits.size() < kept + 1) visits.resize(2 * kept + 64);
+        visits[kept++] = {e, node.child[l], 0};
+      });
       continue;
     }
+    if (visits.size() < kept + most_near_leaves) visits.resize(2 * kept + most_near_leaves);
     for (const WideTree::Node& eight : room.near) {
-      for (unsigned bits = overlapping<Lane>(eight, box); bits != 0; bits &= bits - 1) {
-        look_at(eight, static_cast<std::size_t>(__builtin_ctz(bits)));
+      for (unsigned bits = overlapping<Lane>(eight, edge.lower, edge.upper); bits != 0; bits &= bits - 1) {
+        visits[kept++] = {e, eight.child[static_cast<std::size_t>(__builtin_ctz(bits))], 0};
       }
+    }
+  }
+  const auto keep_if = [&](auto test) __attribute__((always_inline)) {
+    const std::size_t before = kept;
+    kept = 0;
+    for (std::size_t i = 0; i < before; ++i) {
+      EdgeLeafVisit visit = visits[i];
+      visit.triangles = test(visit);
+      visits[kept] = visit;
+      kept += visit.triangles != 0 ? 1 : 0;
+    }
+  };
+  keep_if([&](const EdgeLeafVisit& visit) __attribute__((always_inline)) {
+    const FloatEdge& edge = room.edges[static_cast<std::size_t>(visit.edge)];
+    const WideTree::Node& leaf = tree.nodes[static_cast<std::size_t>(visit.leaf)];
+    return overlapping<Lane>(leaf, edge.lower, edge.upper) &
+           straddled<Lane>(tree.leaves[static_cast<std::size_t>(leaf.leaf)], edge.p, edge.q, farthest);
+  });
+  keep_if([&](const EdgeLeafVisit& visit) __attribute__((always_inline)) {
+    const FloatEdge& edge = room.edges[static_cast<std::size_t>(visit.edge)];
+    const WideTree::Node& leaf = tree.nodes[static_cast<std::size_t>(visit.leaf)];
+    return visit.triangles &
+           within_rims<Lane>(tree.leaves[static_cast<std::size_t>(leaf.leaf)], edge.p, edge.q, farthest);
+  });
+  for (std::size_t i = 0; i < kept; ++i) {
+    const WideTree::Node& leaf = tree.nodes[static_cast<std::size_t>(visits[i].leaf)];
+    for (unsigned bits = visits[i].triangles; bits != 0; bits &= bits - 1) {
+      pairs.push_back({chosen[visits[i].edge], leaf.child[static_cast<std::size_t>(__builtin_ctz(bits))]});
     }
   }
 }
@@ -385,6 +436,11 @@ struct Builder {
           tree.farthest = std::max(tree.farthest, std::abs(p[axis]));
         }
       }
+      const auto& [a, b, c] = triangles[triangle];
+      const Vector3 normal = area_normal(vertices[a], vertices[b], vertices[c]).stableNormalized();
+      const FloatPoint rounded = to_float(normal);
+      for (std::size_t axis = 0; axis < 3; ++axis) leaf.normal[axis][l] = rounded[axis];
+      leaf.offset[l] = static_cast<float>(normal.dot(vertices[a]));
       leaf.extent = std::max(leaf.extent, 1.001F * static_cast<float>(boxes[triangle].size().maxCoeff()));
       if (static_cast<int>(l) >= count) continue;
       set_lane(index, l, boxes[triangle], triangle);

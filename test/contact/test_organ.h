@@ -18,6 +18,7 @@ struct TestOrgan {
   Detection detection;
   Penetration penetration;
   std::vector<char> memory;
+  std::vector<Vector3> detected_in;  ///< vertices of the instrument of the last pass
 
   explicit TestOrgan(const TriangleMesh& surface_mesh)
       : mesh(surface_mesh),
@@ -51,6 +52,8 @@ struct TestOrgan {
 
   const std::vector<int>& detect_in(const InstrumentSurface& instrument, const Pose& pose = Pose(),
                                     CollidingSet set = CollidingSet::flood) {
+    if (instrument.vertices != detected_in) prepare(detection, surface());  // what it knows is of another one
+    detected_in = instrument.vertices;
     detect(surface(), instrument, pose, set, memory, detection);
     return detection.colliding;
   }

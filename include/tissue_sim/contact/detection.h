@@ -27,8 +27,17 @@ struct CrossedEdge {
 /// Where the crossings put a border vertex.
 enum class Side : signed char { unknown, inside, outside, contradicted };
 
+/// A ball in the tip frame that the instrument's surface does not reach into, and the triangle that bounds it. The
+/// instrument stands still in that frame, so the ball stays free whatever organ and instrument do: it has to be
+/// forgotten for no motion, jump or reset.
+struct FreeBall {
+  Vector3 centre = Vector3::Zero();
+  double radius = -1.0;  ///< m; negative: not known
+  int triangle = -1;
+};
+
 /// What stage 1 finds between one organ and one piece of an instrument. Reused from step to step: nothing is allocated
-/// once it has been as large as it needs.
+/// once it has been as large as it needs. To be prepared anew for another organ or piece.
 struct Detection {
   std::vector<Crossing> crossings;
   std::vector<CrossedEdge> crossed_edges;  ///< ascending
@@ -45,6 +54,7 @@ struct Detection {
   std::vector<Side> side;    ///< per vertex, where side_stamp is the current one
   std::vector<int> nearest;  ///< per vertex: the triangle of the instrument found last, or -1; a guess for the next
                              ///< search, which makes it shorter and changes nothing else
+  std::vector<FreeBall> free_balls;       ///< per patch: around where its middle was when that was last asked for
   std::vector<FloatPoint> local_rounded;  ///< of `local`
   std::vector<EdgeTrianglePair> pairs;    ///< that may cross
   WideTreeRoom tree_room;

@@ -40,6 +40,8 @@ struct WideTree {
   /// The corners of a leaf's triangles, lane by lane; free lanes repeat the last triangle.
   struct alignas(32) Leaf {
     std::array<std::array<Row, 3>, 3> corners;  ///< corner, axis
+    std::array<Row, 3> normal;                  ///< unit, or zero where the triangle is degenerate
+    Row offset;                                 ///< m, of the plane: normal . corner
     float extent = 0.0F;                        ///< m, the longest side of the box of any of them
   };
 
@@ -57,11 +59,25 @@ struct EdgeTrianglePair {
   int triangle = 0;
 };
 
+/// An edge near to a leaf: numbers among those that are chosen, and among the nodes.
+struct EdgeLeafVisit {
+  int edge = 0;
+  int leaf = 0;
+  unsigned triangles = 0;  ///< lanes of the leaf, a bit each
+};
+
+/// The ends of an edge and its box.
+struct FloatEdge {
+  FloatPoint p, q, lower, upper;
+};
+
 /// Room for queries. Nothing is allocated once it has been as large as it needs.
 struct WideTreeRoom {
   std::vector<int> stack;
   std::vector<int> leaves;           ///< nodes that are leaves
   std::vector<WideTree::Node> near;  ///< boxes of `leaves`, eight a node
+  std::vector<FloatEdge> edges;      ///< that are chosen
+  std::vector<EdgeLeafVisit> visits;
 };
 
 /// Appends the pairs of edges that run near to each other (such as those of a patch) and triangles of the tree that may
