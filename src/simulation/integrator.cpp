@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 
 namespace tissue_sim {
 
@@ -22,33 +21,6 @@ constexpr double solid_stiffening = 0.7;
 /// Beyond four times the substeps it is a matter of the health check.
 constexpr double most_stiffening = 16.0;
 
-// Vectors of three doubles go through registers four at a time: one by one the vertices took as long as a fifth of the
-// elements.
-using FourDoubles = double __attribute__((vector_size(32)));
-using FourFloats = float __attribute__((vector_size(16)));
-
-/// x, y, z of a vertex, and something.
-__attribute__((always_inline)) inline void read(const std::vector<Vector3>& vectors, std::size_t v, FourDoubles& four) {
-  if (v + 1 < vectors.size()) {
-    std::memcpy(&four, vectors[v].data(), sizeof four);  // with the x of the next one
-  } else {
-    four = FourDoubles{vectors[v].x(), vectors[v].y(), vectors[v].z(), 0.0};
-  }
-}
-
-__attribute__((always_inline)) inline void read_motion(const RestShape& rest, const Moving& moving, std::size_t v,
-                                                       FourDoubles& displacement, FourDoubles& velocity) {
-  FourDoubles origin;
-  read(rest.positions, v, origin);
-  read(moving.positions, v, displacement);
-  displacement -= origin;
-  read(moving.velocities, v, velocity);
-}
-
-__attribute__((always_inline)) inline void write(const FourDoubles& four, Vector3& vector) {
-  std::memcpy(vector.data(), &four, sizeof vector);
-}
-
 /// All vertices that are simulated, or those of a list.
 struct EveryVertex {
   std::size_t first;
@@ -66,22 +38,20 @@ struct SomeVertices {
 template <class Vertices, class Add>
 void tetrahedra_forces(const RestShape& rest, const Moving& moving, const Vertices& vertices, const Add& add,
                        ElementRoom& room, std::vector<Vector3>& forces) {
-  FourDoubles displacement, velocity, whole, speed_of_whole;
-  read_motion(rest, moving, room.reference, whole, speed_of_whole);
-  whole += rest.damping_time * speed_of_whole;
+  const auto moved = [&](std::size_t v) -> Vector3 {
+    return moving.positions[v] - rest.positions[v] + rest.damping_time * moving.velocities[v];
+  };
+  const Vector3 whole = moved(room.reference);
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     const std::size_t v = vertices[i];
-    read_motion(rest, moving, v, displacement, velocity);
-    const FourFloats moved = __builtin_convertvector(displacement + rest.damping_time * velocity - whole, FourFloats);
-    std::memcpy(room.displacements[v].data(), &moved, sizeof moved);
+    const Vector3 displacement = moved(v) - whole;
+    room.displacements[v] << displacement.cast<float>(), 0.0F;
     room.forces[v].setZero();
   }
   add(room.displacements.front().data(), room.forces.front().data());
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     const std::size_t v = vertices[i];
-    FourFloats force;
-    std::memcpy(&force, room.forces[v].data(), sizeof force);
-    write(__builtin_convertvector(force, FourDoubles), forces[v]);
+    forces[v] = room.forces[v].head<3>().cast<double>();
   }
 }
 
@@ -107,27 +77,24 @@ double enclosed_pull(const EnclosedVolume& enclosed, const std::vector<EnclosedS
 template <class Vertices, class Add>
 void constraint_forces(const RestShape& rest, const Moving& moving, const Vertices& vertices, const Add& add,
                        ElementRoom& room, std::vector<Vector3>& forces) {
-  FourDoubles displacement, velocity, whole, speed_of_whole;
-  read_motion(rest, moving, room.reference, whole, speed_of_whole);
+  const Vector3 whole = moving.positions[room.reference] - rest.positions[room.reference];
+  const Vector3 speed_of_whole = moving.velocities[room.reference];
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     const std::size_t v = vertices[i];
-    read_motion(rest, moving, v, displacement, velocity);
+    const Vector3 displacement = moving.positions[v] - rest.positions[v] - whole;
+    const Vector3 velocity = moving.velocities[v] - speed_of_whole;
     VertexMotion& motion = room.motions[v];
-    FourFloats moved = __builtin_convertvector(displacement - whole, FourFloats);
-    moved[3] = motion.inverse_mass;
-    const FourFloats speed = __builtin_convertvector(velocity - speed_of_whole, FourFloats);
-    std::memcpy(motion.displacement.data(), &moved, sizeof moved);
-    std::memcpy(motion.velocity.data(), &speed, sizeof speed);
+    Eigen::Map<Eigen::Vector3f>(motion.displacement.data()) = displacement.cast<float>();
+    Eigen::Map<Eigen::Vector3f>(motion.velocity.data()) = velocity.cast<float>();
     room.pulls[v] = VertexPull();
   }
   add(room.motions.data(), room.pulls.data(), room.shares.data());
   const double pull = enclosed_pull(rest.enclosed, room.shares);
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     const std::size_t v = vertices[i];
-    FourFloats force, normal;
-    std::memcpy(&force, room.pulls[v].force.data(), sizeof force);
-    std::memcpy(&normal, room.pulls[v].normal.data(), sizeof normal);
-    write(__builtin_convertvector(force, FourDoubles) - pull * __builtin_convertvector(normal, FourDoubles), forces[v]);
+    const Eigen::Map<const Eigen::Vector3f> force(room.pulls[v].force.data());
+    const Eigen::Map<const Eigen::Vector3f> normal(room.pulls[v].normal.data());
+    forces[v] = force.cast<double>() - pull * normal.cast<double>();
   }
 }
 

@@ -300,7 +300,7 @@ class Study {
   }
 
   /// The static solution on the mesh of a run that has settled, next to where it has settled.
-  Reference settle_exactly(const StudyMesh& own, const Simulation& simulation) const {
+  Reference settle_exactly(const StudyMesh& own, Simulation& simulation) const {
     ReferenceProblem problem{own.solid, {lame_moduli(given_.material.young, given_.material.poisson)}};
     for (const Vector3& vertex : own.solid.vertices) {
       const bool held = given_.attached(vertex);
@@ -322,7 +322,7 @@ class Study {
     return result;
   }
 
-  Reference as_it_is(const StudyMesh& own, const Simulation& simulation) const {
+  Reference as_it_is(const StudyMesh& own, Simulation& simulation) const {
     Reference result;
     result.solid = &own.solid;
     result.pose = simulation.pose();
@@ -414,7 +414,7 @@ class Study {
     return row;
   }
 
-  void compare(const StudyMesh& own, const Simulation& simulation, const Vectors& right, StudyRow& row) const {
+  void compare(const StudyMesh& own, Simulation& simulation, const Vectors& right, StudyRow& row) const {
     row.displacement_error = surface_error(own.surface, simulation.positions(), right);
     row.depth_error = depth_error(own, simulation.report(), right, obstacle_of(pieces_, fine_.pose));
   }

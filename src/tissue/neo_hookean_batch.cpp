@@ -158,48 +158,54 @@ TISSUE_SIM_INLINE void pull(const NeoHookeanBatch& batch, std::size_t l, float* 
   store(f, edges + 6 * stride);
 }
 
-/// Which batches: `count` of them, those in `list` or, without one, the first.
-struct Chosen {
+/// Which batches: all, or those of a list.
+struct AllBatches {
+  std::size_t count;
+  std::size_t operator[](std::size_t i) const { return i; }
+};
+struct ListedBatches {
   const int* list;
   std::size_t count;
-  std::size_t operator[](std::size_t i) const { return list != nullptr ? static_cast<std::size_t>(list[i]) : i; }
+  std::size_t operator[](std::size_t i) const { return static_cast<std::size_t>(list[i]); }
 };
 
 /// Gathers a few batches, computes them, scatters them. Rows that were written in halves a moment ago cannot be read
 /// whole without a stall: batch by batch it took 7.6 ns a tetrahedron and not 6.5 (20,000 of them, AVX2, one core of an
 /// AMD EPYC, Zen 4). Corner forces kept for a second pass, a sum for each vertex, took 7.7; tetrahedra in random order
 /// take 6.9.
-template <class Lane>
+template <class Lane, class Chosen>
 TISSUE_SIM_INLINE void add_forces(const NeoHookeanSolid& solid, const Chosen& chosen, const float* displacements,
                                   float* forces) {
   constexpr std::size_t width = sizeof(Lane) / sizeof(float);
   alignas(64) float rows[9 * stride];
   for (std::size_t first = 0; first < chosen.count; first += block) {
     const std::size_t count = std::min(block, chosen.count - first);
-    std::size_t index[block] = {};
-    for (std::size_t b = 0; b < count; ++b) index[b] = chosen[first + b];
-    for (std::size_t b = 0; b < count; ++b) gather(solid.batches[index[b]], displacements, rows + lanes * b);
+    for (std::size_t b = 0; b < count; ++b) gather(solid.batches[chosen[first + b]], displacements, rows + lanes * b);
     for (std::size_t b = 0; b < count; ++b) {
-      for (std::size_t l = 0; l < lanes; l += width) pull<Lane>(solid.batches[index[b]], l, rows + lanes * b + l);
+      for (std::size_t l = 0; l < lanes; l += width)
+        pull<Lane>(solid.batches[chosen[first + b]], l, rows + lanes * b + l);
     }
     for (std::size_t b = 0; b < count; ++b) {
-      const std::size_t tetrahedra = std::min(lanes, solid.tetrahedra - lanes * index[b]);
-      scatter(solid.batches[index[b]], tetrahedra, rows + lanes * b, forces);
+      const std::size_t tetrahedra = std::min(lanes, solid.tetrahedra - lanes * chosen[first + b]);
+      scatter(solid.batches[chosen[first + b]], tetrahedra, rows + lanes * b, forces);
     }
   }
 }
 
+template <class Chosen>
 __attribute__((noinline)) void add_forces_baseline(const NeoHookeanSolid& solid, const Chosen& chosen,
                                                    const float* displacements, float* forces) {
   add_forces<Four>(solid, chosen, displacements, forces);
 }
 #ifdef __x86_64__
+template <class Chosen>
 __attribute__((target("avx2"))) void add_forces_avx2(const NeoHookeanSolid& solid, const Chosen& chosen,
                                                      const float* displacements, float* forces) {
   add_forces<Eight>(solid, chosen, displacements, forces);
 }
 #endif
 
+template <class Chosen>
 void add_chosen(const NeoHookeanSolid& solid, const Chosen& chosen, const float* displacements, float* forces,
                 InstructionSet set) {
   if (!available(set)) {
@@ -258,12 +264,12 @@ const char* name(InstructionSet set) {
 
 void add_neo_hookean_forces(const NeoHookeanSolid& solid, const float* displacements, float* forces,
                             InstructionSet set) {
-  add_chosen(solid, {nullptr, solid.batches.size()}, displacements, forces, set);
+  add_chosen(solid, AllBatches{solid.batches.size()}, displacements, forces, set);
 }
 
 void add_neo_hookean_forces(const NeoHookeanSolid& solid, const std::vector<int>& batches, const float* displacements,
                             float* forces, InstructionSet set) {
-  add_chosen(solid, {batches.data(), batches.size()}, displacements, forces, set);
+  add_chosen(solid, ListedBatches{batches.data(), batches.size()}, displacements, forces, set);
 }
 
 }  // namespace tissue_sim
