@@ -299,4 +299,11 @@ void place_surface(const OrganModel& model, OrganState& state) {
   for (int v = 0; v < model.rest.surface_vertices; ++v) place(model, &v, &v + 1, state);
 }
 
+void place_all(const OrganModel& model, OrganState& state) {
+  if (!moves_less_than_it_shows(model)) return;
+  for (int v = 0; v < static_cast<int>(state.positions.size()); ++v) {
+    if (v < model.rest.first_simulated || !model.levels.empty()) place(model, &v, &v + 1, state);
+  }
+}
+
 }  // namespace tissue_sim

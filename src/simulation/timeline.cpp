@@ -322,10 +322,17 @@ std::int64_t Timeline::now() const {
 
 double Timeline::kinetic_energy() const {
   double energy = 0.0;
+  const auto add = [&energy](const RestShape& shape, const std::vector<Vector3>& velocities) {
+    for (std::size_t v = 0; v < velocities.size(); ++v) energy += 0.5 * shape.mass[v] * velocities[v].squaredNorm();
+  };
   for (std::size_t o = 0; o < impl_->state.organs.size(); ++o) {
-    const RestShape& rest = impl_->world.organs[o].rest;
-    const std::vector<Vector3>& velocities = impl_->state.organs[o].velocities;
-    for (std::size_t v = 0; v < velocities.size(); ++v) energy += 0.5 * rest.mass[v] * velocities[v].squaredNorm();
+    const OrganModel& model = impl_->world.organs[o];
+    const OrganState& organ = impl_->state.organs[o];
+    if (model.levels.empty()) {
+      add(model.rest, organ.velocities);
+    } else {
+      add(model.levels.back().shape, organ.levels.back().velocities);
+    }
   }
   return energy;
 }
@@ -333,6 +340,7 @@ double Timeline::kinetic_energy() const {
 double Timeline::elastic_energy() const {
   double energy = 0.0;
   for (std::size_t o = 0; o < impl_->state.organs.size(); ++o) {
+    place_all(impl_->world.organs[o], impl_->state.organs[o]);
     energy += tissue_sim::elastic_energy(impl_->world.organs[o].rest, impl_->state.organs[o].positions);
   }
   return energy;

@@ -46,6 +46,9 @@ bool moves_less_than_it_shows(const OrganModel& model);
 /// Puts such vertices (first .. last - 1 are their numbers) where they are now.
 void place(const OrganModel& model, const int* first, const int* last, OrganState& state);
 
+/// The same for all vertices, inner ones too.
+void place_all(const OrganModel& model, OrganState& state);
+
 /// The same for the corners of a triangle, and for the whole surface.
 void place(const OrganModel& model, int triangle, OrganState& state);
 void place_surface(const OrganModel& model, OrganState& state);

@@ -104,7 +104,7 @@ class Timeline {
   const TimelineCounters& counters() const;
   std::uint64_t hash() const;     ///< of every state since construction, over positions, velocities and depths
   std::int64_t now() const;       ///< ns, the stamp of the last step or of the first pose; 0 before that
-  double kinetic_energy() const;  ///< J
+  double kinetic_energy() const;  ///< J, with levels that of the coarsest
   double elastic_energy() const;  ///< J
   int active_vertices() const;
 
