@@ -50,7 +50,7 @@ void press_and_leave(Simulation& simulation, const Dent& place) {
 }
 
 /// Nothing is left to wait for: a tenth of the bound away, and slower than what would lead back to it in two seconds.
-bool settled(const Simulation& simulation) {
+bool settled(Simulation& simulation) {
   double fastest = 0.0;
   for (const Vector3& v : simulation.organ().velocities) fastest = std::max(fastest, v.norm());
   return fastest < 1e-6 && rms_from_rest(simulation.rest(), simulation.organ().positions) < 1e-6;

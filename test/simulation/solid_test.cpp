@@ -19,7 +19,7 @@ Simulation pressed(const Organ& organ, int settle = 400) {
   return simulation;
 }
 
-std::set<int> bearing_vertices(const Simulation& simulation) {
+std::set<int> bearing_vertices(Simulation& simulation) {
   std::set<int> bearing;
   for (const ContactPoint& point : simulation.workspace.organs[0].points) {
     for (int i = 0; i < point.bearers.count; ++i) bearing.insert(point.bearers.vertices[i]);
