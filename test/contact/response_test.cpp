@@ -153,7 +153,7 @@ TEST(StopAtInstrument, NeverPulls) {
   points[0].impulse = 99.0;  // of the substep before
   stop(points, {1.0, 1.0, 1.0}, v);
   EXPECT_EQ(points[0].impulse, 0.0);
-  EXPECT_EQ(v, before);
+  for (std::size_t i = 0; i < v.size(); ++i) EXPECT_LT((v[i] - before[i]).norm(), 1e-13);
 }
 
 TEST(StopAtInstrument, ImpulsesAreTheChangeOfMomentum) {
@@ -323,7 +323,7 @@ TEST(BearForces, PointsThatShareVerticesBearWhatTheyHold) {
     }
     Vector3 held = Vector3::Zero();
     for (const Vector3& force : forces) held += force;
-    points = borne(inverse_mass, forces, points);
+    for (int substep = 0; substep < 20; ++substep) points = borne(inverse_mass, forces, points);  // as a step goes on
     for (std::size_t p = 0; p < points.size(); ++p) {
       EXPECT_NEAR(points[p].force, presses[p], 1e-3);
       held += points[p].force * points[p].direction;
