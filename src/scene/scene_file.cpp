@@ -321,6 +321,21 @@ std::optional<double> read_levels(const YamlMapping& organ) {
   return tolerance;
 }
 
+/// Why a solid has no levels, and the cure; empty: it can have them.
+std::string why_no_levels(const Organ& organ) {
+  if (organ.integrator == Integrator::vertex_block_descent) {
+    return "are moved explicitly, and integrator is vertex_block_descent: delete one of the two";
+  }
+  if (!organ.restoration) {
+    return "put what sleeps back where the elastic organ has it, and restoration is false: delete one of the two";
+  }
+  if (organ.embedded) {
+    return "are of a solid that is touched itself, and this one carries a mesh: delete levels, or name the solid as "
+           "the mesh";
+  }
+  return "";
+}
+
 /// What all models of an organ share.
 Organ read_common(const YamlMapping& yaml) {
   Organ organ;
@@ -378,6 +393,8 @@ Alternative read_named(const YamlMapping& yaml, std::vector<std::string>& warnin
   }
   organ.solid = std::move(shape.solids[0].mesh);
   organ.embedded = shape.solids[0].embedded;
+  const std::string why = organ.levels_tolerance && organ.model == Model::fem ? why_no_levels(organ) : "";
+  if (!why.empty()) yaml.fail("levels", why);
   read.solid = shape.solids[0].file;
   return read;
 }
@@ -412,6 +429,13 @@ std::vector<Alternative> read_alternatives(const YamlMapping& yaml, std::vector<
       if (!is_solid(model)) break;
       organ.solid = solid.mesh;
       organ.embedded = solid.embedded;
+      organ.levels_tolerance = common.levels_tolerance;
+      const std::string why = organ.levels_tolerance && model == Model::fem ? why_no_levels(organ) : "";
+      if (!why.empty()) {
+        organ.levels_tolerance.reset();
+        warnings.push_back(yaml.place("levels") + "accuracy tries fem on " + solid.file + " without levels: they " +
+                           why);
+      }
       alternatives.push_back({organ, solid.file});
     }
   }

@@ -45,6 +45,7 @@ struct Moved {
 Moved moved(const OrganModel& model, std::size_t level, int v, const OrganState& state);
 
 Moved by_coarser(const OrganModel& model, std::size_t level, int v, const OrganState& state) {
+  if (shape_of(model, level).attached[v]) return {};  // the pins hold only their middle in place
   const Embedding& embedding = model.levels[level].finer;
   Moved sum;
   for (std::size_t i = 0; i < 4; ++i) {
@@ -120,24 +121,24 @@ void hold_pins(const Level& level, double dt, const LevelView& at) {
   for (std::size_t p = 0; p < level.pins.corners.size(); ++p) {
     const Tetrahedron& corners = level.pins.corners[p];
     const std::array<double, 4>& weights = level.pins.weights[p];
+    // A pin of which a corner is asleep lies outside the region: the coarser level holds it.
+    const auto asleep = [&](int v) { return at.region.mark[v] == Part::asleep; };
+    if (std::any_of(corners.begin(), corners.end(), asleep)) continue;
     Vector3 velocity = Vector3::Zero();
     double ease = 0.0;
-    bool awake = false;
     for (std::size_t i = 0; i < 4; ++i) {
       const int v = corners[i];
-      if (at.region.mark[v] == Part::asleep) continue;
-      awake = true;
       velocity += weights[i] * (at.velocities[v] + pin_return / dt * (at.positions[v] - at.shape.positions[v]));
       ease += weights[i] * weights[i] * at.shape.inverse_mass[v];
     }
-    if (!awake) continue;
     for (std::size_t i = 0; i < 4; ++i) {
+      if (at.region.mark[corners[i]] != Part::free) continue;  // driven: where the coarser level has it
       at.velocities[corners[i]] -= weights[i] * at.shape.inverse_mass[corners[i]] / ease * velocity;
     }
   }
 }
 
-/// One explicit substep of a coarser level: elements, what the contacts pushed, band.
+/// One explicit substep of a coarser level: elements, what the contacts pushed, band. Returns the largest speed, m/s.
 double move_level(const OrganModel& model, std::size_t level, const Vector3& gravity, double dt, OrganState& state,
                   ElementRoom& room) {
   const LevelView at = view(model, level, state);
@@ -236,8 +237,10 @@ double move_coarser(const OrganModel& model, const Vector3& gravity, int substep
   for (std::size_t level = model.levels.size(); level > 0; --level) {
     LevelState& at = state.levels[level - 1];
     const int every = substeps / at.substeps;
-    if ((substep - 1) % every != 0) continue;
-    fastest = std::max(fastest, move_level(model, level, gravity, every * dt, state, room.elements[level - 1]));
+    const bool begins = (substep - 1) % every == 0;
+    if (begins) at.speed = move_level(model, level, gravity, every * dt, state, room.elements[level - 1]);
+    fastest = std::max(fastest, at.speed);
+    if (!begins) continue;
     if (level < model.levels.size()) follow_on(every * dt, view(model, level, state));
     at.ahead = every * dt;
     follow(model, level - 1, state);  // from where it is now: what has been followed so far ends here

@@ -294,6 +294,13 @@ OrganSummary Timeline::summary(int organ) const {
   summary.embedded = rest.first_simulated > 0;
   summary.shell_triangles = static_cast<int>(rest.shell.size());
   summary.shell_edge = mean_edge_length(rest.positions, rest.shell_topology.edges);
+  for (std::size_t level = 0; !model.levels.empty() && level <= model.levels.size(); ++level) {
+    const bool own = level == 0;
+    const RestShape& shape = own ? rest : model.levels[level - 1].shape;
+    summary.levels.push_back({own ? model.fine_edge : model.levels[level - 1].edge,
+                              static_cast<int>(shape.tetrahedra.size()),
+                              level < model.regions.size() ? model.regions[level].radius : 0.0});
+  }
   summary.plastic = rest.elastic() && !model.restoration;
   summary.attached = static_cast<int>(std::count(rest.attached.begin(), rest.attached.end(), 1));
   summary.distance_elements = static_cast<int>(rest.distances.size());
@@ -351,7 +358,13 @@ int Timeline::active_vertices() const {
   for (std::size_t o = 0; o < impl_->state.organs.size(); ++o) {
     const OrganState& organ = impl_->state.organs[o];
     const RestShape& rest = impl_->world.organs[o].rest;
-    if (!organ.asleep) active += static_cast<int>(organ.positions.size()) - rest.first_simulated;
+    if (organ.asleep) continue;
+    if (organ.levels.empty()) {
+      active += static_cast<int>(organ.positions.size()) - rest.first_simulated;
+      continue;
+    }
+    active += static_cast<int>(organ.region.free.size());
+    for (const LevelState& level : organ.levels) active += static_cast<int>(level.region.free.size());
   }
   return active;
 }

@@ -48,6 +48,11 @@ void choose_integrator(const Scene& scene, const Organ& organ, OrganModel& model
     model.integrator_reason = "the scene asks for it";
     return;
   }
+  if (organ.levels_tolerance && organ.model == Model::fem) {
+    model.integrator = Integrator::explicit_substeps;
+    model.integrator_reason = "levels move explicitly";
+    return;
+  }
   const bool many = is_solid(organ.model) && substeps > explicit_substeps_limit;
   model.integrator = many ? Integrator::vertex_block_descent : Integrator::explicit_substeps;
   if (!model.rest.elastic()) {
@@ -62,7 +67,7 @@ void choose_integrator(const Scene& scene, const Organ& organ, OrganModel& model
 
 void add_levels(const Organ& organ, OrganModel& model) {
   model.levels = build_levels(organ, model.rest);
-  model.fine_edge = median_edge(model.rest);
+  model.fine_edge = fine_edge(model.rest);
   model.shear_modulus = lame_moduli(organ.material.young, organ.material.poisson).mu;
   const RegionSize size = region_size(*organ.levels_tolerance);
   for (std::size_t level = 0; level < model.levels.size(); ++level) {

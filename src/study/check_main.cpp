@@ -136,6 +136,23 @@ std::string shell_text(const Organ& organ, const OrganSummary& summary) {
               1e3 * shell_edge(organ));
 }
 
+/// The levels of a solid, a row each, or why there are none.
+void print_levels(const Organ& organ, const OrganSummary& summary) {
+  if (!organ.levels_tolerance) return row("levels", "off");
+  const double tolerance = 100.0 * *organ.levels_tolerance;
+  if (summary.levels.empty()) {
+    return row(
+        "levels",
+        text("off: for a tolerance of %.3g %% the tetrahedra around a contact would be most of the organ", tolerance));
+  }
+  row("levels", text("on: %zu, tolerance %.3g %%", summary.levels.size(), tolerance));
+  for (const LevelSummary& level : summary.levels) {
+    const std::string awake =
+        level.radius > 0.0 ? text("awake within %.1f mm of a contact", 1e3 * level.radius) : "all awake";
+    row("", text("%d tetrahedra of %.1f mm, ", level.tetrahedra, 1e3 * level.edge) + awake);
+  }
+}
+
 void print_organ(const Organ& organ, const OrganSummary& summary) {
   const bool stepped = organ.model != Model::contact_only;
   std::printf("organ %s\n", organ.name.c_str());
@@ -146,6 +163,7 @@ void print_organ(const Organ& organ, const OrganSummary& summary) {
   row("mesh", text("%d vertices, %d triangles, %d surface(s)", summary.vertices, summary.triangles,
                    inspect(organ.mesh).components));
   if (organ.model == Model::surface) row("coarse shell", shell_text(organ, summary));
+  if (organ.model == Model::fem) print_levels(organ, summary);
   row("size", size_text(organ.mesh));
   row("volume", text("%.4g litres", 1000.0 * enclosed_volume(organ.mesh)));
   row("memory", size_of(summary.memory));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "tissue_sim/geometry/lattice.h"
 #include "tissue_sim/tissue/stability.h"
@@ -13,8 +14,14 @@ namespace {
 /// Of the organ's moduli: linear tetrahedra of a coarse lattice are too stiff by about this.
 constexpr double coarse_modulus = 0.9;
 
+/// Cells of the coarser level: a smaller region would be all band, and its error is not known.
+constexpr double least_cells = 2.0;
+
 /// A region that is more of the organ than this saves nothing.
 constexpr double largest_part = 0.3;
+
+/// One in so many tetrahedra, the smallest, is what the mesh of an organ is fine for.
+constexpr std::size_t finest_part = 4;
 
 /// What a tetrahedron of the lattice counts at least. With nothing in it the vertices on its far side would be free.
 constexpr double least_fill = 0.02;
@@ -29,14 +36,20 @@ double volume_of(const RestShape& shape) {
   return volume;
 }
 
-/// The attached vertices of the finer level in one tetrahedron hold it at their middle. Its nodes may stand a good way
-/// off the tissue: held themselves, they would make a thin organ thicker and far softer.
-void add_pins(const RestShape& finer, Level& level) {
-  std::vector<int> held;
-  for (std::size_t v = 0; v < finer.positions.size(); ++v) {
-    if (finer.attached[v]) held.push_back(static_cast<int>(v));
+/// The attached vertices of the organ in one tetrahedron hold it at their middle. Its nodes may stand a good way off
+/// the tissue: held themselves, they would make a thin organ thicker and far softer.
+void add_pins(const RestShape& organ, const Lattice& lattice, Level& level) {
+  std::vector<Vector3> places;
+  std::vector<double> masses;
+  for (std::size_t v = 0; v < organ.positions.size(); ++v) {
+    if (!organ.attached[v]) continue;
+    places.push_back(organ.positions[v]);
+    masses.push_back(organ.mass[v]);
   }
-  const std::vector<Tetrahedron>& corners = level.finer.corners;
+  const Embedding embedding = embed(places, lattice);
+  const std::vector<Tetrahedron>& corners = embedding.corners;
+  std::vector<int> held(places.size());
+  std::iota(held.begin(), held.end(), 0);
   std::sort(held.begin(), held.end(),
             [&](int a, int b) { return corners[a] < corners[b] || (corners[a] == corners[b] && a < b); });
   double mass = 0.0;
@@ -47,16 +60,16 @@ void add_pins(const RestShape& finer, Level& level) {
       level.pins.weights.push_back({});
       mass = 0.0;
     }
-    const double before = mass / (mass + finer.mass[v]);
-    mass += finer.mass[v];
+    const double before = mass / (mass + masses[v]);
+    mass += masses[v];
     std::array<double, 4>& weights = level.pins.weights.back();
     for (std::size_t c = 0; c < 4; ++c) {
-      weights[c] = before * weights[c] + (1.0 - before) * level.finer.weights[v][c];
+      weights[c] = before * weights[c] + (1.0 - before) * embedding.weights[v][c];
     }
   }
 }
 
-Level build_level(const Organ& organ, const RestShape& finer, double edge) {
+Level build_level(const Organ& organ, const RestShape& finest, const RestShape& finer, double edge) {
   const Lattice lattice = cover(organ.solid, finer.positions, edge);
   Level level;
   level.edge = edge;
@@ -80,7 +93,7 @@ Level build_level(const Organ& organ, const RestShape& finer, double edge) {
     shape.tetrahedra.push_back(NeoHookeanElement::at_rest(corners, x, {fill * moduli.mu, fill * moduli.lambda}));
   }
   shape.attached.assign(shape.positions.size(), 0);
-  add_pins(finer, level);
+  add_pins(finest, lattice, level);
   for (std::size_t v = 0; v < level.bearing.weights.size(); ++v) {
     std::array<double, 4>& weights = level.bearing.weights[v];
     double sum = 0.0;
@@ -104,16 +117,26 @@ Level build_level(const Organ& organ, const RestShape& finer, double edge) {
 RegionSize region_size(double tolerance) {
   // A radius of 3 cells of the coarser level, each twice the edge of the finer, made errors of 1 to 3 % in the force, 3
   // to 4 % near the contact and 10 to 12 % over a whole block bonded to the ground; 4 cells a third of that.
-  const double cells = 3.0 + (0.05 - tolerance) / 0.03;
+  const double cells = std::max(least_cells, 3.0 + (0.05 - tolerance) / 0.03);
   return {2.0 * cells, cells};
 }
 
-double median_edge(const RestShape& shape) {
+double fine_edge(const RestShape& shape) {
+  struct Sized {
+    double volume;
+    const NeoHookeanElement* element;
+  };
+  std::vector<Sized> finest;
+  for (const NeoHookeanElement& element : shape.tetrahedra) finest.push_back({element.volume, &element});
+  // Stable, so that a tie leaves the same ones on every machine.
+  std::stable_sort(finest.begin(), finest.end(), [](const Sized& a, const Sized& b) { return a.volume < b.volume; });
+  finest.resize((finest.size() + finest_part - 1) / finest_part);
   std::vector<double> edges;
-  for (const NeoHookeanElement& element : shape.tetrahedra) {
+  for (const Sized& sized : finest) {
+    const auto& corners = sized.element->vertices;
     for (std::size_t i = 0; i < 4; ++i) {
       for (std::size_t j = i + 1; j < 4; ++j) {
-        edges.push_back((shape.positions[element.vertices[j]] - shape.positions[element.vertices[i]]).norm());
+        edges.push_back((shape.positions[corners[j]] - shape.positions[corners[i]]).norm());
       }
     }
   }
@@ -126,10 +149,10 @@ std::vector<Level> build_levels(const Organ& organ, const RestShape& finest) {
   std::vector<Level> levels;
   const RegionSize size = region_size(*organ.levels_tolerance);
   const double volume = volume_of(finest);
-  double edge = median_edge(finest);
+  double edge = fine_edge(finest);
   while (half_ball(size.edges * edge) < largest_part * volume) {
     edge *= size.edges / size.cells;
-    levels.push_back(build_level(organ, levels.empty() ? finest : levels.back().shape, edge));
+    levels.push_back(build_level(organ, finest, levels.empty() ? finest : levels.back().shape, edge));
   }
   return levels;
 }

@@ -119,6 +119,14 @@ TEST(Allocation, NoneInAWarmStepOfAnEmbeddedSurface) {
   }
 }
 
+TEST(Allocation, NoneInAWarmStepWithLevels) {
+  const Vector3 size(0.08, 0.08, 0.03);
+  Organ organ = solid_organ(make_block(size, {24, 24, 9}), size, Model::fem);
+  organ.levels_tolerance = 0.05;
+  EXPECT_EQ(allocations_of_a_solid(organ, 0.0, 0.006), 0u);
+  EXPECT_EQ(allocations_of_a_solid(organ, 0.0, 0.001), 0u) << "thinner than a triangle";
+}
+
 TEST(Allocation, NoneInAWarmStep) {
   EXPECT_EQ(allocations_once_warm(DepthScheme::exact, CollidingSet::flood), 0u);
 }

@@ -26,7 +26,7 @@ double wake(const OrganModel& model, const std::vector<ContactPoint>& points, Or
 void share_substeps(const OrganModel& model, double duration, OrganState& state, int& substeps);
 
 /// Moves the coarser levels whose substep begins with substep `substep` (1 is the first) of the organ's own
-/// tetrahedra, which takes dt (s). Returns the largest speed, m/s.
+/// tetrahedra, which takes dt (s). Returns the largest speed (m/s) in the last substep of any of them.
 double move_coarser(const OrganModel& model, const Vector3& gravity, int substep, int substeps, double dt,
                     OrganState& state, LevelsRoom& room);
 

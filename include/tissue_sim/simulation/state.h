@@ -29,6 +29,7 @@ struct LevelState {
   ActiveRegion region;
   int substeps = 1;    ///< in this step
   double ahead = 0.0;  ///< s, of the substep that the organ's own tetrahedra are in
+  double speed = 0.0;  ///< m/s, the largest in its last substep
 };
 
 /// What a step changes of one organ, and all that the next step reads of it.

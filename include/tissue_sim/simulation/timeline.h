@@ -46,16 +46,24 @@ struct OrganView {
   Span<double> depths;      ///< m, 0 where the instrument does not press
 };
 
+/// One level of a `fem` organ.
+struct LevelSummary {
+  double edge = 0.0;  ///< m
+  int tetrahedra = 0;
+  double radius = 0.0;  ///< m, of what is awake around a contact; 0: all of it is
+};
+
 /// What will be modelled of one organ, and what it takes.
 struct OrganSummary {
   int vertices = 0;
   int triangles = 0;
   int simulated_vertices = 0;  ///< what is integrated: of the surface, of the solid; 0 for contact_only
   int tetrahedra = 0;
-  bool embedded = false;    ///< the surface is carried by the tetrahedra or by a coarse shell
-  int shell_triangles = 0;  ///< of the coarse shell; 0: there is none
-  double shell_edge = 0.0;  ///< m, its mean edge
-  bool plastic = false;     ///< what the instrument moved stays moved
+  bool embedded = false;             ///< the surface is carried by the tetrahedra or by a coarse shell
+  int shell_triangles = 0;           ///< of the coarse shell; 0: there is none
+  double shell_edge = 0.0;           ///< m, its mean edge
+  std::vector<LevelSummary> levels;  ///< the organ's own tetrahedra first; empty: all of them are awake
+  bool plastic = false;              ///< what the instrument moved stays moved
   int attached = 0;
   int distance_elements = 0;
   int area_elements = 0;

@@ -27,7 +27,8 @@ struct Level {
 /// most of it.
 std::vector<Level> build_levels(const Organ& organ, const RestShape& finest);
 
-/// m, the median edge of tetrahedra.
-double median_edge(const RestShape& shape);
+/// m, the median edge of the smallest quarter of the tetrahedra. A graded mesh is fine where it will be touched, and
+/// its regions have to be as small as that asks for: the median of all would follow the coarse rest of a large organ.
+double fine_edge(const RestShape& shape);
 
 }  // namespace tissue_sim
