@@ -343,7 +343,10 @@ int Timeline::active_vertices() const {
   for (std::size_t o = 0; o < impl_->state.organs.size(); ++o) {
     const OrganState& organ = impl_->state.organs[o];
     const RestShape& rest = impl_->world.organs[o].rest;
-    if (!organ.asleep) active += static_cast<int>(organ.positions.size()) - rest.first_simulated;
+    if (organ.asleep) continue;
+    active += organ.wakes_in_parts() ? static_cast<int>(organ.region.free.size())
+                                     : static_cast<int>(organ.positions.size()) - rest.first_simulated;
+    for (const LevelState& level : organ.levels) active += static_cast<int>(level.region.free.size());
   }
   return active;
 }
