@@ -27,8 +27,8 @@ constexpr double sharp = 3.0;
 /// in motion explicit is exact, where one sweep carries a push a few elements far.
 constexpr int explicit_substeps_limit = 10;
 
-/// Of a wall: in an organ of which a region is more, what is pressed out of the region shows elsewhere. With 0.24 of the
-/// bundled liver awake the force was right and the displacement over the whole surface 40 % off.
+/// Of a wall: in an organ of which a region is more, what is pressed out of the region shows elsewhere. With 0.24 of
+/// the bundled liver awake the force was right and the displacement over the whole surface 40 % off.
 constexpr double largest_wall_part = 0.2;
 
 /// Bending lengths: radius of a wall's region. On a tube of 30 mm radius, held from behind, with a wall of 4 mm, a ball
