@@ -11,6 +11,46 @@ namespace {
 /// moves.
 constexpr double band_edges = 2.5;
 
+/// What the batches of constraints multiply their vertices by.
+constexpr int floats_of_vertex = 8;
+
+/// Every vertex of the rows once, and the box around them.
+template <class Rows>
+void add_batch(const Rows& rows, int scale, const RestShape& shape, std::vector<Box>& boxes, RegionModel& model) {
+  std::vector<int> vertices;
+  for (const auto& row : rows) vertices.insert(vertices.end(), row.begin(), row.end());
+  for (int& v : vertices) v /= scale;
+  std::sort(vertices.begin(), vertices.end());
+  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+  Box box;
+  for (const int v : vertices) box.add(shape.positions[v]);
+  boxes.push_back(box);
+  model.vertices.items.insert(model.vertices.items.end(), vertices.begin(), vertices.end());
+  model.vertices.first.push_back(static_cast<int>(model.vertices.items.size()));
+}
+
+std::size_t count_batches(const RestShape& shape) {
+  const ConstraintBatches& constraints = shape.constraints;
+  return shape.packed.batches.size() + constraints.pairs.size() + constraints.flaps.size() +
+         constraints.triangles.size() + constraints.distances.size();
+}
+
+/// Where all batches are constraints: each kind's own, ascending, as ConstraintSelection asks for.
+void sort_out(const ConstraintBatches& constraints, std::vector<int>& batches, ConstraintSelection& selection) {
+  std::sort(batches.begin(), batches.end());
+  auto next = batches.begin();
+  int first = 0;
+  const auto take = [&](std::size_t count, std::vector<int>& kind) {
+    kind.clear();
+    for (; next != batches.end() && *next < first + static_cast<int>(count); ++next) kind.push_back(*next - first);
+    first += static_cast<int>(count);
+  };
+  take(constraints.pairs.size(), selection.pairs);
+  take(constraints.flaps.size(), selection.flaps);
+  take(constraints.triangles.size(), selection.triangles);
+  take(constraints.distances.size(), selection.distances);
+}
+
 }  // namespace
 
 RegionModel build_region_model(const RestShape& shape, double radius, double edge) {
@@ -19,17 +59,21 @@ RegionModel build_region_model(const RestShape& shape, double radius, double edg
   model.band = band_edges * edge;
   std::vector<Box> boxes;
   model.vertices.first.push_back(0);
-  for (const NeoHookeanBatch& batch : shape.packed.batches) {
-    std::vector<int> vertices;
-    for (const auto& row : batch.vertices) vertices.insert(vertices.end(), row.begin(), row.end());
-    std::sort(vertices.begin(), vertices.end());
-    vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
-    Box box;
-    for (const int v : vertices) box.add(shape.positions[v]);
-    boxes.push_back(box);
-    model.vertices.items.insert(model.vertices.items.end(), vertices.begin(), vertices.end());
-    model.vertices.first.push_back(static_cast<int>(model.vertices.items.size()));
-  }
+  for (const NeoHookeanBatch& batch : shape.packed.batches) add_batch(batch.vertices, 1, shape, boxes, model);
+  model.batches.build(boxes);
+  return model;
+}
+
+RegionModel build_wall_region_model(const RestShape& shape, double radius) {
+  RegionModel model;
+  model.radius = radius;
+  std::vector<Box> boxes;
+  model.vertices.first.push_back(0);
+  const auto add = [&](const auto& rows) { add_batch(rows, floats_of_vertex, shape, boxes, model); };
+  for (const PairBatch& batch : shape.constraints.pairs) add(batch.flap.vertices);
+  for (const FlapBatch& batch : shape.constraints.flaps) add(batch.vertices);
+  for (const TriangleBatch& batch : shape.constraints.triangles) add(batch.vertices);
+  for (const DistanceBatch& batch : shape.constraints.distances) add(batch.vertices);
   model.batches.build(boxes);
   return model;
 }
@@ -37,7 +81,7 @@ RegionModel build_region_model(const RestShape& shape, double radius, double edg
 void prepare(RegionRoom& room, const RestShape& shape) {
   room.vertex_stamp.assign(shape.positions.size(), 0);
   room.distance.assign(shape.positions.size(), 0.0);
-  room.batch_stamp.assign(shape.packed.batches.size(), 0);
+  room.batch_stamp.assign(count_batches(shape), 0);
 }
 
 void recentre(const RegionModel& model, const RestShape& shape, const std::vector<std::vector<Vector3>>& centres,
@@ -56,7 +100,9 @@ void recentre(const RegionModel& model, const RestShape& shape, const std::vecto
   for (const int v : region.driven) region.mark[v] = Part::asleep;
   std::vector<int>& before = room.fallen;  // becomes those of them that are not free again
   before.swap(region.free);
-  region.active.tetrahedra.clear();
+  // Constraints are listed here too until they are sorted out.
+  std::vector<int>& batches = region.active.tetrahedra;
+  batches.clear();
   region.driven.clear();
   region.free.clear();
   for (const std::vector<Vector3>& of_piece : centres) {
@@ -74,15 +120,20 @@ void recentre(const RegionModel& model, const RestShape& shape, const std::vecto
         }
         awake = awake || room.distance[*v] < model.radius;
       }
-      if (awake) region.active.tetrahedra.push_back(batch);
+      if (awake) batches.push_back(batch);
     });
   }
-  for (const int batch : region.active.tetrahedra) {
+  for (const int batch : batches) {
     for (const int* v = model.vertices.begin(batch); v != model.vertices.end(batch); ++v) {
       if (room.vertex_stamp[*v] == 0) continue;
       room.vertex_stamp[*v] = 0;  // listed
       (room.distance[*v] < model.radius ? region.free : region.driven).push_back(*v);
     }
+  }
+  if (shape.packed.batches.empty()) {
+    sort_out(shape.constraints, batches, region.active.constraints);
+    region.active.others_rest = true;
+    batches.clear();
   }
 
   // What was free and is not any more falls asleep; what is free and was not wakes.

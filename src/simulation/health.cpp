@@ -22,7 +22,7 @@ bool healthy(const OrganModel& model, const OrganState& state) {
   const auto sound = [limit](const RestShape& shape, const auto& at, std::size_t v) {
     return healthy(shape.positions[v], at.positions[v], at.velocities[v], limit);
   };
-  if (state.levels.empty()) {
+  if (!state.wakes_in_parts()) {
     for (std::size_t v = static_cast<std::size_t>(rest.first_simulated); v < state.positions.size(); ++v) {
       if (!sound(rest, state, v)) return false;
     }

@@ -57,14 +57,15 @@ void tetrahedra_forces(const RestShape& rest, const Moving& moving, const Vertic
 
 /// How hard the enclosed volume pulls on its gradient by the vertices' normals, N/m^2. Its change is summed in double,
 /// lane by lane: of a million triangles' shares a float would keep no digit of a small one.
-double enclosed_pull(const EnclosedVolume& enclosed, const std::vector<EnclosedShare>& shares) {
+template <class ForEachShare>
+double enclosed_pull(const EnclosedVolume& enclosed, const ForEachShare& for_each_share) {
   if (!(enclosed.stiffness > 0.0)) return 0.0;
   std::array<double, constraint_lanes> changes{};
   std::array<double, constraint_lanes> rates{};
-  for (const EnclosedShare& share : shares) {
+  for_each_share([&](const EnclosedShare& share) {
     for (std::size_t l = 0; l < constraint_lanes; ++l) changes[l] += static_cast<double>(share.change[l]);
     for (std::size_t l = 0; l < constraint_lanes; ++l) rates[l] += static_cast<double>(share.rate[l]);
-  }
+  });
   double change = 0.0;
   double rate = 0.0;
   for (const double c : changes) change += c;
@@ -74,9 +75,9 @@ double enclosed_pull(const EnclosedVolume& enclosed, const std::vector<EnclosedS
 }
 
 /// Forces of distance, area and volume elements and the enclosed volume.
-template <class Vertices, class Add>
+template <class Vertices, class Add, class ForEachShare>
 void constraint_forces(const RestShape& rest, const Moving& moving, const Vertices& vertices, const Add& add,
-                       ElementRoom& room, std::vector<Vector3>& forces) {
+                       const ForEachShare& for_each_share, ElementRoom& room, std::vector<Vector3>& forces) {
   const Vector3 whole = moving.positions[room.reference] - rest.positions[room.reference];
   const Vector3 speed_of_whole = moving.velocities[room.reference];
   for (std::size_t i = 0; i < vertices.size(); ++i) {
@@ -89,7 +90,7 @@ void constraint_forces(const RestShape& rest, const Moving& moving, const Vertic
     room.pulls[v] = VertexPull();
   }
   add(room.motions.data(), room.pulls.data(), room.shares.data());
-  const double pull = enclosed_pull(rest.enclosed, room.shares);
+  const double pull = enclosed_pull(rest.enclosed, for_each_share);
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     const std::size_t v = vertices[i];
     const Eigen::Map<const Eigen::Vector3f> force(room.pulls[v].force.data());
@@ -162,7 +163,10 @@ void element_forces(const RestShape& rest, const Moving& moving, std::vector<Vec
   const auto add = [&](const VertexMotion* motions, VertexPull* pulls, EnclosedShare* shares) {
     add_constraint_forces(rest.constraints, motions, pulls, shares);
   };
-  constraint_forces(rest, moving, vertices, add, room, forces);
+  const auto for_each_share = [&](auto&& visit) {
+    for (const EnclosedShare& share : room.shares) visit(share);
+  };
+  constraint_forces(rest, moving, vertices, add, for_each_share, room, forces);
 }
 
 void element_forces(const RestShape& rest, const Moving& moving, const ActiveElements& active,
@@ -178,7 +182,17 @@ void element_forces(const RestShape& rest, const Moving& moving, const ActiveEle
   const auto add = [&](const VertexMotion* motions, VertexPull* pulls, EnclosedShare* shares) {
     add_constraint_forces(rest.constraints, active.constraints, motions, pulls, shares);
   };
-  constraint_forces(rest, moving, vertices, add, room, forces);
+  const auto for_each_share = [&](auto&& visit) {
+    if (!active.others_rest) {
+      for (const EnclosedShare& share : room.shares) visit(share);
+      return;
+    }
+    for (const int pair : active.constraints.pairs) visit(room.shares[pair]);
+    const std::size_t first = rest.constraints.pairs.size();
+    for (const int triangle : active.constraints.triangles)
+      visit(room.shares[first + static_cast<std::size_t>(triangle)]);
+  };
+  constraint_forces(rest, moving, vertices, add, for_each_share, room, forces);
 }
 
 namespace {
@@ -186,7 +200,7 @@ namespace {
 /// Calls visit(vertex) for what is integrated now.
 template <class Visit>
 void for_each_free(const RestShape& rest, const OrganState& state, Visit&& visit) {
-  if (!state.levels.empty()) {
+  if (state.wakes_in_parts()) {
     for (const int v : state.region.free) {
       if (!rest.attached[v]) visit(static_cast<std::size_t>(v));
     }

@@ -13,6 +13,19 @@ constexpr double awake_after_contact = 0.3;
 /// Of an edge: contact points closer than this to a centre need none of their own.
 constexpr double centre_spacing = 0.5;
 
+/// Of the radius of a wall's region: the same there. A region is recentred by as much.
+constexpr double wall_centre_spacing = 0.125;
+
+/// s. ... and no longer than this while something else is touched.
+constexpr double longest_awake = 1.0;
+
+/// Of an edge: what is no farther from rest, now or in `settling_time` (s), is put to rest.
+constexpr double settled = 0.01;
+constexpr double settling_time = 0.01;
+
+/// Centres of a wall that are made room for from the start.
+constexpr std::size_t usual_centres = 64;
+
 /// Of the way: what a pin that has strayed comes back in one substep.
 constexpr double pin_return = 0.2;
 
@@ -112,6 +125,67 @@ void wake_level(const OrganModel& model, std::size_t level, const std::vector<Co
   follow(model, level, state);
 }
 
+/// Whether what only centre `c` keeps awake is at rest.
+bool is_settled(const OrganModel& model, const OrganState& state, std::size_t c) {
+  const std::vector<Vector3>& centres = state.centres.front();
+  const double reach = model.regions.front().radius * model.regions.front().radius;
+  const double limit = settled * model.fine_edge;
+  for (const int v : state.region.free) {
+    const Vector3& place = model.rest.positions[v];
+    if ((place - centres[c]).squaredNorm() >= reach) continue;
+    bool shared = false;
+    for (std::size_t i = 0; i < centres.size(); ++i) shared |= i != c && (place - centres[i]).squaredNorm() < reach;
+    if (shared) continue;
+    const double away = (state.positions[v] - place).norm() + settling_time * state.velocities[v].norm();
+    if (!(away < limit)) return false;
+  }
+  return true;
+}
+
+/// Of a wall, where nothing sleeps but what is at rest. A centre stays until what it keeps awake has come back: one a
+/// call is let go, the first of the list.
+double wake_wall(const OrganModel& model, const std::vector<ContactPoint>& points, OrganState& state,
+                 RegionRoom& room) {
+  const double spacing = wall_centre_spacing * model.regions.front().radius;
+  std::vector<Vector3>& centres = state.centres.front();
+  bool changed = false;
+  if (state.asleep) {
+    changed = !centres.empty();
+    centres.clear();
+    state.untouched.clear();
+  }
+  for (const ContactPoint& point : points) {
+    const Vector3 place = at_point(point, model.rest.positions);
+    std::size_t c = 0;
+    while (c < centres.size() && (centres[c] - place).squaredNorm() >= spacing * spacing) ++c;
+    if (c < centres.size()) {
+      state.untouched[c] = 0.0;
+      continue;
+    }
+    centres.push_back(place);
+    state.untouched.push_back(0.0);
+    changed = true;
+  }
+  for (std::size_t c = 0; c < centres.size(); ++c) {
+    if (state.untouched[c] <= awake_after_contact) continue;
+    const bool long_ago = !points.empty() && state.untouched[c] > longest_awake;
+    if (!long_ago && !is_settled(model, state, c)) continue;
+    centres.erase(centres.begin() + static_cast<std::ptrdiff_t>(c));
+    state.untouched.erase(state.untouched.begin() + static_cast<std::ptrdiff_t>(c));
+    changed = true;
+    break;
+  }
+  if (!changed) return 0.0;
+  recentre(model.regions.front(), model.rest, state.centres, state.region, room);
+  double farthest = 0.0;
+  for (const int v : room.fallen) {
+    farthest = std::max(farthest, (model.rest.positions[v] - state.positions[v]).norm());
+    state.positions[v] = model.rest.positions[v];
+    state.velocities[v].setZero();
+  }
+  return farthest;
+}
+
 double edge_of(const OrganModel& model, std::size_t level) {
   return level == 0 ? model.fine_edge : model.levels[level - 1].edge;
 }
@@ -168,17 +242,25 @@ double move_level(const OrganModel& model, std::size_t level, const Vector3& gra
 
 void prepare(LevelsRoom& room, const OrganModel& model) {
   room.elements.resize(model.levels.size());
-  room.regions.resize(model.levels.size());
+  room.regions.resize(model.regions.size());
   for (std::size_t level = 0; level < model.levels.size(); ++level) {
     prepare(room.elements[level], model.levels[level].shape);
+  }
+  for (std::size_t level = 0; level < model.regions.size(); ++level) {
     prepare(room.regions[level], shape_of(model, level));
   }
 }
 
 void rest_levels(const OrganModel& model, std::size_t pieces, OrganState& state) {
+  state.region.mark.assign(model.rest.positions.size(), Part::asleep);
+  if (model.levels.empty()) {  // a wall
+    state.centres.resize(1);
+    state.centres.front().reserve(usual_centres);
+    state.untouched.reserve(usual_centres);
+    return;
+  }
   state.centres.assign(pieces, {});
   state.untouched.assign(pieces, 0.0);
-  state.region.mark.assign(model.rest.positions.size(), Part::asleep);
   for (const Level& level : model.levels) {
     LevelState& at = state.levels.emplace_back();
     at.positions = level.shape.positions;
@@ -198,6 +280,7 @@ void rest_levels(const OrganModel& model, std::size_t pieces, OrganState& state)
 }
 
 double wake(const OrganModel& model, const std::vector<ContactPoint>& points, OrganState& state, LevelsRoom& room) {
+  if (model.levels.empty()) return wake_wall(model, points, state, room.regions.front());
   const double spacing = centre_spacing * model.fine_edge;
   std::vector<char>& seen = room.touching;
   seen.assign(state.centres.size(), 0);

@@ -127,7 +127,11 @@ void keep_forces(StepContext& context) {
 }
 
 void stand_still(OrganState& state) {
-  std::fill(state.velocities.begin(), state.velocities.end(), Vector3::Zero());
+  if (state.wakes_in_parts()) {
+    for (const int v : state.region.active.vertices) state.velocities[v].setZero();
+  } else {
+    std::fill(state.velocities.begin(), state.velocities.end(), Vector3::Zero());
+  }
   for (LevelState& level : state.levels) std::fill(level.velocities.begin(), level.velocities.end(), Vector3::Zero());
 }
 
@@ -145,8 +149,11 @@ double integrate_elements(StepContext& context) {
     return speed;
   }
   double coarser_speed = 0.0;
-  if (model.levels.empty()) {
+  if (model.regions.empty()) {
     element_forces(model.rest, state, state.forces, work.elements);
+  } else if (model.levels.empty()) {
+    element_forces(model.rest, state, state.region.active, state.forces, work.elements);
+    for (double& time : state.untouched) time += context.dt;
   } else {
     coarser_speed =
         move_coarser(model, context.world.gravity, context.substep, context.substeps, context.dt, state, work.levels);
@@ -367,13 +374,13 @@ void respond(StepContext& context) {
     add_edge_contacts(surface, piece.surface, index, pose, work.detections[p], work.points);
     add_poke_contacts(surface, piece.surface, index, pose, poking, context.state.clearances[p], work.points);
   }
-  const bool levels = !context.model().levels.empty();
-  if (levels && !context.state.asleep && context.substep == 1)
+  const bool parts = !context.model().regions.empty();
+  if (parts && !context.state.asleep && context.substep == 1)
     note_motion(context, wake(context.model(), work.points, context.state, work.levels));
   if (work.points.empty()) return;
 
   if (!rest.embedding.corners.empty()) bear_by(rest.embedding, rest.triangles, context.state.positions, work.points);
-  if (levels && (context.state.asleep || !all_awake(work.points, context.state))) {
+  if (parts && (context.state.asleep || !all_awake(work.points, context.state))) {
     note_motion(context, wake(context.model(), work.points, context.state, work.levels));
   }
   context.state.asleep = context.state.asleep && !rest.elastic();

@@ -40,7 +40,7 @@ OrganState rest_state(const World& world, int organ) {
   }
   state.touching.resize(world.pieces.size());
   for (const InstrumentPiece& piece : world.pieces) state.clearances.emplace_back(piece.surface.vertices.size());
-  if (!model.levels.empty()) rest_levels(model, world.pieces.size(), state);
+  if (!model.regions.empty()) rest_levels(model, world.pieces.size(), state);
   state.pressing.reserve(usual_contacts);
   state.pressed.reserve(usual_contacts);
   state.asleep = world.gravity.isZero();
@@ -62,7 +62,7 @@ std::uint64_t hash_word(std::uint64_t word, std::uint64_t seed) {
 
 std::uint64_t hash_state(const OrganModel& model, const OrganState& organ, std::uint64_t seed) {
   const auto first = static_cast<std::size_t>(model.rest.first_simulated);
-  if (!organ.levels.empty()) {
+  if (organ.wakes_in_parts()) {
     for (const int v : organ.region.free) {
       seed = hash_doubles(organ.positions[v].data(), 3, seed);
       seed = hash_doubles(organ.velocities[v].data(), 3, seed);
@@ -75,7 +75,7 @@ std::uint64_t hash_state(const OrganModel& model, const OrganState& organ, std::
     seed = hash_doubles(organ.positions[first].data(), count, seed);
     seed = hash_doubles(organ.velocities[first].data(), count, seed);
   }
-  if (first == 0 && organ.levels.empty()) return hash_doubles(organ.depths.data(), organ.depths.size(), seed);
+  if (first == 0 && !organ.wakes_in_parts()) return hash_doubles(organ.depths.data(), organ.depths.size(), seed);
   for (const int triangle : organ.pressed) {
     for (const int v : model.rest.triangles[triangle]) seed = hash_doubles(&organ.depths[v], 1, seed);
   }
@@ -97,7 +97,12 @@ void copy_region(const ActiveRegion& from, ActiveRegion& to) {
 }  // namespace
 
 void copy_state(const OrganModel& model, const OrganState& from, OrganState& to) {
-  if (!from.levels.empty()) {
+  if (from.wakes_in_parts()) {
+    // What has fallen asleep since the copy was made has gone to where it sleeps.
+    for (const int v : to.region.active.vertices) {
+      to.positions[v] = from.positions[v];
+      to.velocities[v] = from.velocities[v];
+    }
     for (const int v : from.region.active.vertices) {
       to.positions[v] = from.positions[v];
       to.velocities[v] = from.velocities[v];

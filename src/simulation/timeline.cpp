@@ -359,11 +359,8 @@ int Timeline::active_vertices() const {
     const OrganState& organ = impl_->state.organs[o];
     const RestShape& rest = impl_->world.organs[o].rest;
     if (organ.asleep) continue;
-    if (organ.levels.empty()) {
-      active += static_cast<int>(organ.positions.size()) - rest.first_simulated;
-      continue;
-    }
-    active += static_cast<int>(organ.region.free.size());
+    active += organ.wakes_in_parts() ? static_cast<int>(organ.region.free.size())
+                                     : static_cast<int>(organ.positions.size()) - rest.first_simulated;
     for (const LevelState& level : organ.levels) active += static_cast<int>(level.region.free.size());
   }
   return active;

@@ -6,6 +6,7 @@
 
 #include "tissue_sim/simulation/integrator.h"
 #include "tissue_sim/simulation/vertex_block_descent.h"
+#include "tissue_sim/tissue/coarse_shell.h"
 
 namespace tissue_sim {
 
@@ -25,6 +26,20 @@ constexpr double sharp = 3.0;
 /// Explicit substeps of a solid beyond which `auto` takes vertex block descent. In time the two are even at three, but
 /// in motion explicit is exact, where one sweep carries a push a few elements far.
 constexpr int explicit_substeps_limit = 10;
+
+/// Of a wall: in an organ of which a region is more, what is pressed out of the region shows elsewhere. With 0.24 of
+/// the bundled liver awake the force was right and the displacement over the whole surface 40 % off.
+constexpr double largest_wall_part = 0.2;
+
+/// Bending lengths: radius of a wall's region. On a tube of 30 mm radius, held from behind, with a wall of 4 mm, a ball
+/// of 5 mm pressed 4 mm in met a force that was larger by 28-35, 10-13, 2-4 and 0-2 % than that of the same coarse
+/// shell all awake, with a radius of 6, 8, 10 and 12 bending lengths: the push goes around the tube, and a dome would
+/// do with
+/// 4. That shell all awake is too soft there by 9-12 % at a tolerance of 5 %, and by 7-8 % at 3 %. With the two
+/// together the force was within 3 % of that of the organ's own mesh all awake: 8 lengths at 5 %, 9 at 3 %.
+double wall_region_lengths(double tolerance) {
+  return 8.0 + 2.0 * std::log(0.05 / tolerance);
+}
 
 void refuse_if_too_stiff(const Scene& scene, const Organ& organ, const RestShape& rest) {
   const int substeps = substeps_for(rest, scene.time_step);
@@ -77,6 +92,51 @@ void add_levels(const Organ& organ, OrganModel& model) {
   }
 }
 
+/// Whether every part of the wall is near something that holds it. Else the organ goes aside as a whole when it is
+/// pressed, and no part of it has an answer of its own.
+bool is_supported(const RestShape& rest, double reach) {
+  std::vector<Box> held;
+  for (std::size_t v = 0; v < rest.positions.size(); ++v) {
+    if (!rest.attached[v]) continue;
+    held.emplace_back();
+    held.back().add(rest.positions[v]);
+  }
+  if (held.empty()) return false;
+  AabbTree tree;
+  tree.build(held);
+  for (const Triangle& corners : rest.wall_triangles()) {
+    for (const int v : corners) {
+      Box place;
+      place.add(rest.positions[v]);
+      bool near = false;
+      tree.for_each_near(place.grown(reach), [&](int) { near = true; });
+      if (!near) return false;
+    }
+  }
+  return true;
+}
+
+/// A part of a wall awake, where the rest of it can be left at rest. What is pushed out of the region pushes the
+/// sleeping wall outwards too, so that less of it comes to bear than on a stiff wall.
+void add_wall_region(const Organ& organ, OrganModel& model) {
+  RestShape& rest = model.rest;
+  const double radius = wall_region_lengths(*organ.levels_tolerance) * bending_length(organ);
+  double area = 0.0;
+  double held = 0.0;
+  for (const auto& [a, b, c] : rest.wall_triangles()) {
+    const double of_triangle = 0.5 * area_normal(rest.positions[a], rest.positions[b], rest.positions[c]).norm();
+    area += of_triangle;
+    if (rest.attached[a] && rest.attached[b] && rest.attached[c]) held += of_triangle;
+  }
+  const double part = 3.14159265358979 * radius * radius / area;
+  if (!organ.restoration || part > largest_wall_part || !is_supported(rest, radius)) return;
+  model.regions.push_back(build_wall_region_model(rest, radius));
+  model.fine_edge = mean_edge_length(rest.positions, rest.wall_topology().edges);
+  const double softer = 1.0 / (1.0 + rest.enclosed.stiffness / rest.enclosed.wall * (1.0 - held / area - part));
+  rest.enclosed.stiffness *= softer;
+  rest.enclosed.damping *= softer;
+}
+
 }  // namespace
 
 World build_world(const Scene& scene) {
@@ -118,6 +178,8 @@ World build_world(const Scene& scene) {
         for (int& corner : model.tetrahedra_at.items) corner /= 4;
       }
       if (organ.levels_tolerance && organ.model == Model::fem) add_levels(organ, model);
+      if (organ.levels_tolerance && organ.model == Model::surface && scene.gravity.isZero())
+        add_wall_region(organ, model);
     }
     world.organs.push_back(std::move(model));
   }

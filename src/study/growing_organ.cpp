@@ -97,6 +97,7 @@ Scene growing_scene(int triangles) {
   organ.name = "tube";
   organ.mesh = make_tube(triangles);
   organ.model = Model::surface;
+  organ.levels_tolerance = 0.02;
   organ.wall_thickness = 0.004;
   organ.material = {10000.0, 0.45, 1060.0, 0.1, 20.0};
   for (std::size_t v = 0; v < organ.mesh.vertices.size(); ++v) {

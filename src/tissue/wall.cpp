@@ -102,8 +102,8 @@ void add_flaps(const WallStiffness& wall, const std::vector<double>& areas, doub
 void add_enclosed_volume(const WallStiffness& wall, const Organ& organ, double area, RestShape& shape) {
   shape.enclosed.rest =
       shape.shell.empty() ? enclosed_volume(organ.mesh) : enclosed_volume({shape.positions, shape.shell});
-  const double stiffness_of_wall = 2.0 / 9.0 * area * wall.membrane / (1.0 - organ.material.poisson);
-  shape.enclosed.stiffness = content_over_wall * stiffness_of_wall;
+  shape.enclosed.wall = 2.0 / 9.0 * area * wall.membrane / (1.0 - organ.material.poisson);
+  shape.enclosed.stiffness = content_over_wall * shape.enclosed.wall;
 }
 
 /// Each triangle of the wall gives a third of its mass to each corner.

@@ -9,13 +9,16 @@ namespace tissue_sim {
 
 /// What a level needs to wake only a part of it. Never changes.
 struct RegionModel {
-  AabbTree batches;     ///< of the batches of tetrahedra, at rest
+  AabbTree batches;     ///< of the batches of tetrahedra; or of pairs, flaps, triangles, distances; at rest
   FlatLists vertices;   ///< of each batch, every one once
   double radius = 0.0;  ///< m, around what touches an instrument
   double band = 0.0;    ///< m, inside the radius: where the coarser level takes over
 };
 
 RegionModel build_region_model(const RestShape& shape, double radius, double edge);
+
+/// The same for a wall, which has no coarser level: what is not free stays at its rest place, and there is no band.
+RegionModel build_wall_region_model(const RestShape& shape, double radius);
 
 /// What a vertex has to do with a region.
 enum class Part : char { asleep, driven, free };
@@ -25,6 +28,7 @@ struct ActiveElements {
   std::vector<int> vertices;        ///< all corners of the batches are among them
   std::vector<int> tetrahedra;      ///< ascending, into RestShape::packed
   ConstraintSelection constraints;  ///< into RestShape::constraints
+  bool others_rest = false;         ///< the others are at rest: they add nothing to the enclosed volume
 };
 
 /// A free vertex that a spring pulls towards the coarser level.

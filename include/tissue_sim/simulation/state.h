@@ -45,12 +45,13 @@ struct OrganState {
   std::vector<Clearance> clearances;          ///< per piece
   std::vector<PlaceForce> pressing;           ///< what the contacts of the last substep bore
   double stiffening = 0.0;                    ///< of an explicit solid in the last substep; see stiffening()
-  ActiveRegion region;                        ///< of the organ's own tetrahedra, with levels
+  ActiveRegion region;                        ///< of the organ's own tetrahedra, with levels; or of its wall
   std::vector<LevelState> levels;             ///< the coarser ones, the finest first
   std::vector<std::vector<Vector3>> centres;  ///< per piece: m, rest places of what it touches or has just touched
-  std::vector<double> untouched;              ///< per piece: s since it touched
+  std::vector<double> untouched;              ///< per piece: s since it touched; of a wall's only list: per centre
   bool asleep = true;                         ///< at rest and untouched: nothing to integrate
 
+  bool wakes_in_parts() const { return !region.mark.empty(); }
   bool holds(std::size_t vertex) const { return !held.empty() && held[vertex] != 0; }
 };
 

@@ -30,12 +30,12 @@ struct OrganModel {
   double drag = 0.0;                                      ///< 1/s
   Integrator integrator = Integrator::explicit_substeps;  ///< never automatic
   std::string integrator_reason;
-  FlatLists tetrahedra_at;               ///< per vertex, of an explicit `fem`, else empty
-  Incidence incidence;                   ///< for vertex block descent, else empty
-  std::vector<Level> levels;             ///< coarser ones, the finest first; empty: all of the organ is simulated
-  std::vector<RegionModel> regions;      ///< of the organ's own tetrahedra and of each level but the coarsest
-  double fine_edge = 0.0;                ///< m, of the organ's own tetrahedra
-  double shear_modulus = 0.0;            ///< Pa
+  FlatLists tetrahedra_at;           ///< per vertex, of an explicit `fem`, else empty
+  Incidence incidence;               ///< for vertex block descent, else empty
+  std::vector<Level> levels;         ///< coarser ones, the finest first; empty: all of the organ is simulated
+  std::vector<RegionModel> regions;  ///< of the organ's own tetrahedra and of each level but the coarsest; of a wall
+  double fine_edge = 0.0;            ///< m, of the organ's own tetrahedra
+  double shear_modulus = 0.0;        ///< Pa
   std::vector<std::vector<int>> poking;  ///< per piece: its vertices that may poke into a triangle of this organ
   double motion_limit = 0.0;             ///< m, the farthest an instrument may move between two contact passes
 };
