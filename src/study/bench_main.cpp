@@ -32,6 +32,10 @@ constexpr Command commands[] = {
      "  elements                     ns a tetrahedron: the forces of a substep, or a sweep of vertex block descent; "
      "the\n"
      "                               elements of a substep against one by one and against what the machine can do\n"},
+    {"levels", bench_levels,
+     "  levels                       a solid under a probe with levels against everything awake: time, and error of "
+     "force\n"
+     "                               and displacement\n"},
     {"load", bench_load,
      "  load                         an organ of 100,000 and one of 1,000,000 triangles, from file to first step\n"},
 };

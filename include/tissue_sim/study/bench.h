@@ -32,6 +32,7 @@ bool bench_peers(BenchWords words, JsonRows& json);
 bool bench_scale(BenchWords words, JsonRows& json);
 bool bench_limits(BenchWords words, JsonRows& json);
 bool bench_elements(BenchWords words, JsonRows& json);
+bool bench_levels(BenchWords words, JsonRows& json);
 bool bench_load(BenchWords words, JsonRows& json);
 
 }  // namespace tissue_sim
