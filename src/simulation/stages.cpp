@@ -146,7 +146,7 @@ double integrate_elements(StepContext& context) {
   }
   double coarser_speed = 0.0;
   if (model.levels.empty()) {
-    element_forces(model.rest, state, state.forces, work.elements);
+    element_forces(model.rest, state, state.forces, work.elements, context.workspace.threads.get());
   } else {
     coarser_speed =
         move_coarser(model, context.world.gravity, context.substep, context.substeps, context.dt, state, work.levels);
@@ -183,8 +183,9 @@ bool all_awake(const std::vector<ContactPoint>& points, const OrganState& state)
 
 }  // namespace
 
-Workspace build_workspace(const World& world) {
+Workspace build_workspace(const World& world, int threads) {
   Workspace workspace;
+  if (threads != 1) workspace.threads = std::make_unique<Threads>(threads);
   workspace.before.resize(static_cast<std::size_t>(world.instruments));
   workspace.now.resize(static_cast<std::size_t>(world.instruments));
   for (std::size_t organ = 0; organ < world.organs.size(); ++organ) {

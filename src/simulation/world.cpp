@@ -113,6 +113,7 @@ World build_world(const Scene& scene) {
         for (int& corner : model.tetrahedra_at.items) corner /= 4;
       }
       if (organ.levels_tolerance && organ.model == Model::fem) add_levels(organ, model);
+      if (model.levels.empty()) cut_elements(model.rest);
     }
     world.organs.push_back(std::move(model));
   }
