@@ -146,7 +146,8 @@ std::uint64_t spread(std::uint64_t x) {
   return (x | x << 2) & 0x1249249249249249ull;
 }
 
-/// The points' indices along a Morton curve of 2^21 cells along the longest side of their box; ties by index.
+}  // namespace
+
 std::vector<int> along_curve(const std::vector<Vector3>& points) {
   const Box box = bounds_of(points);
   const double longest = points.empty() ? 0.0 : box.size().maxCoeff();
@@ -163,8 +164,6 @@ std::vector<int> along_curve(const std::vector<Vector3>& points) {
   std::transform(order.begin(), order.end(), indices.begin(), [](const auto& entry) { return entry.second; });
   return indices;
 }
-
-}  // namespace
 
 bool is_flat(const Vector3& a, const Vector3& b, const Vector3& c, const Vector3& d) {
   const double longest2 = std::max({(b - a).squaredNorm(), (c - a).squaredNorm(), (d - a).squaredNorm(),

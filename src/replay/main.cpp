@@ -7,6 +7,7 @@
 #include "tissue_sim/replay/replay.h"
 #include "tissue_sim/ros/messages.h"
 #include "tissue_sim/simulation/accuracy.h"
+#include "tissue_sim/simulation/threads.h"
 
 namespace {
 
@@ -16,12 +17,13 @@ using tissue_sim::ReplayOrgan;
 using tissue_sim::ReplaySummary;
 
 constexpr const char* usage =
-    "usage: tissue_sim_replay SCENE IN.bag OUT.bag [--json FILE] [--state-period S] [--hold S]\n"
+    "usage: tissue_sim_replay SCENE IN.bag OUT.bag [--json FILE] [--state-period S] [--hold S] [--threads N]\n"
     "  SCENE             scene file; its pose topics are read from IN.bag\n"
     "  OUT.bag           gets topology, state, contacts and measured_cf under /tissue_sim\n"
     "  --json FILE       write the summary, with a row for each pose\n"
     "  --state-period S  simulated seconds between two states (0.016)\n"
-    "  --hold S          step on for S seconds after the last pose (0)\n";
+    "  --hold S          step on for S seconds after the last pose (0)\n"
+    "  --threads N       for the elements of large organs; the result is the same bits for any number (1)\n";
 
 struct Arguments {
   std::string scene, json;
@@ -33,6 +35,12 @@ bool read_seconds(const char* text, double least, double& seconds) {
   char* end = nullptr;
   seconds = std::strtod(text, &end);
   return end != text && *end == '\0' && seconds >= least && seconds <= 1e6;
+}
+
+bool read_threads(const std::string& text, int& threads) {
+  if (text.empty() || text.size() > 2 || text.find_first_not_of("0123456789") != std::string::npos) return false;
+  threads = std::stoi(text);
+  return threads >= 1 && threads <= tissue_sim::most_threads;
 }
 
 bool read_arguments(int argc, char** argv, Arguments& arguments) {
@@ -51,6 +59,8 @@ bool read_arguments(int argc, char** argv, Arguments& arguments) {
       arguments.options.timeline.state_period = std::llround(seconds * 1e9);
     } else if (word == "--hold" && read_seconds(argv[i], 0.0, seconds)) {
       arguments.options.hold = seconds;
+    } else if (word == "--threads") {
+      if (!read_threads(argv[i], arguments.options.timeline.threads)) return false;
     } else {
       return false;
     }

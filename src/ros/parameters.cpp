@@ -5,14 +5,15 @@
 #include <stdexcept>
 
 #include "tissue_sim/ros/node.h"
+#include "tissue_sim/simulation/threads.h"
 
 namespace tissue_sim {
 namespace {
 
 using Value = XmlRpc::XmlRpcValue;
 
-const std::array<const char*, 6> known_parameters{"scene",          "advance",   "state_period", "time_jump_threshold",
-                                                  "keep_all_poses", "tf_timeout"};
+const std::array<const char*, 7> known_parameters{"scene",          "advance",    "state_period", "time_jump_threshold",
+                                                  "keep_all_poses", "tf_timeout", "threads"};
 
 /// Letters to insert, remove or change to make one word of the other.
 std::size_t edit_distance(const std::string& a, const std::string& b) {
@@ -73,6 +74,16 @@ double read_seconds(Value& all, const std::string& name, double otherwise, doubl
   return seconds;
 }
 
+int read_threads(Value& all, int otherwise) {
+  if (!all.hasMember("threads")) return otherwise;
+  const bool whole = all["threads"].getType() == Value::TypeInt;
+  const int threads = whole ? static_cast<int>(all["threads"]) : 0;
+  if (threads < 1 || threads > most_threads) {
+    refuse("threads", "expected a whole number from 1 to " + std::to_string(most_threads));
+  }
+  return threads;
+}
+
 std::int64_t nanoseconds(double seconds) {
   return std::llround(seconds * 1e9);
 }
@@ -101,6 +112,7 @@ NodeParameters read_parameters() {
   parameters.tf_timeout = read_seconds(all, "tf_timeout", parameters.tf_timeout, 0.0, 10.0);
   parameters.timeline.state_period = nanoseconds(read_seconds(all, "state_period", 0.016, 1e-4, 60.0));
   parameters.timeline.time_jump_threshold = nanoseconds(read_seconds(all, "time_jump_threshold", 0.5, 1e-3, 3600.0));
+  parameters.timeline.threads = read_threads(all, parameters.timeline.threads);
   parameters.timeline.newest_only = !parameters.keep_all_poses;
   return parameters;
 }

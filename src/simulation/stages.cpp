@@ -150,7 +150,7 @@ double integrate_elements(StepContext& context) {
   }
   double coarser_speed = 0.0;
   if (model.regions.empty()) {
-    element_forces(model.rest, state, state.forces, work.elements);
+    element_forces(model.rest, state, state.forces, work.elements, context.workspace.threads.get());
   } else if (model.levels.empty()) {
     element_forces(model.rest, state, state.region.active, state.forces, work.elements);
     for (double& time : state.untouched) time += context.dt;
@@ -190,8 +190,9 @@ bool all_awake(const std::vector<ContactPoint>& points, const OrganState& state)
 
 }  // namespace
 
-Workspace build_workspace(const World& world) {
+Workspace build_workspace(const World& world, int threads) {
   Workspace workspace;
+  if (threads != 1) workspace.threads = std::make_unique<Threads>(threads);
   workspace.before.resize(static_cast<std::size_t>(world.instruments));
   workspace.now.resize(static_cast<std::size_t>(world.instruments));
   for (std::size_t organ = 0; organ < world.organs.size(); ++organ) {

@@ -42,7 +42,7 @@ std::size_t bytes(const RestShape& rest) {
          bytes(rest.topology.vertex_triangles) + bytes(rest.attached) + bytes(rest.mass) + bytes(rest.inverse_mass) +
          bytes(rest.distances) + bytes(rest.areas) + bytes(rest.volumes) + bytes(rest.tetrahedra) +
          bytes(rest.packed.batches) + bytes(rest.constraints.pairs) + bytes(rest.constraints.flaps) +
-         bytes(rest.constraints.triangles) + bytes(rest.constraints.distances);
+         bytes(rest.constraints.triangles) + bytes(rest.constraints.distances) + bytes(rest.chunks.seams);
 }
 
 std::size_t bytes(const OrganState& state) {
@@ -73,7 +73,7 @@ struct Timeline::Impl {
   Impl(const Scene& scene, const TimelineOptions& given)
       : world(build_world(with_models_chosen(scene))),
         options(given),
-        workspace(build_workspace(world)),
+        workspace(build_workspace(world, given.threads)),
         state(rest_state(world)) {
     longest_step = in_nanoseconds(scene.time_step);
     tracks.resize(static_cast<std::size_t>(world.instruments));

@@ -180,6 +180,7 @@ World build_world(const Scene& scene) {
       if (organ.levels_tolerance && organ.model == Model::fem) add_levels(organ, model);
       if (organ.levels_tolerance && organ.model == Model::surface && scene.gravity.isZero())
         add_wall_region(organ, model);
+      if (model.regions.empty()) cut_elements(model.rest);
     }
     world.organs.push_back(std::move(model));
   }

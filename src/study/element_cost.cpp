@@ -27,10 +27,10 @@ constexpr double vertex_operations = 24.0;
 /// Of a vertex: position, rest, velocity and force in double; what the batches read and write of it, once each way.
 constexpr double vertex_bytes = 4.0 * sizeof(Vector3);
 
-Scene block_scene(Model model, Integrator integrator) {
+Scene block_scene(Model model, Integrator integrator, int cells = 10) {
   Organ block;
   block.name = "block";
-  block.solid = make_block({0.03, 0.03, 0.015}, {20, 20, 10});
+  block.solid = make_block({0.03, 0.03, 0.015}, {2 * cells, 2 * cells, cells});
   block.mesh = take_surface(block.solid);
   block.model = model;
   block.integrator = integrator;
@@ -58,12 +58,12 @@ double least_seconds(Work work) {
 }
 
 /// As a hollow organ of test 9's sphere.
-Scene sphere_scene() {
+Scene sphere_scene(int slices = 64) {
   Scene scene = block_scene(Model::fem, Integrator::explicit_substeps);
   Organ& sphere = scene.organs.front();
   sphere.name = "sphere";
   sphere.solid = TetrahedralMesh();
-  sphere.mesh = make_sphere(0.05, 64);
+  sphere.mesh = make_sphere(0.05, slices);
   sphere.model = Model::surface;
   sphere.wall_thickness = 0.004;
   sphere.attached.assign(1, 0);
@@ -215,6 +215,33 @@ std::vector<SubstepCost> time_substeps() {
   return {time_substep("surface", sphere_scene()),
           time_substep("volume", block_scene(Model::volume, Integrator::explicit_substeps)),
           time_substep("fem", block_scene(Model::fem, Integrator::explicit_substeps))};
+}
+
+std::vector<ThreadsCost> time_threads() {
+  const auto time = [](const char* name, const Scene& scene) {
+    const World world = build_world(scene);
+    const RestShape& rest = world.organs.front().rest;
+    OrganState state = rest_state(world, 0);
+    deform_a_little(state);
+    Workspace workspace = build_workspace(world, 2);
+    ElementRoom& room = workspace.organs.front().elements;
+    ThreadsCost cost;
+    cost.organ = name;
+    cost.elements =
+        static_cast<int>(rest.distances.size() + rest.areas.size() + rest.volumes.size() + rest.tetrahedra.size());
+    cost.seconds = cost.two_seconds = 1e300;
+    for (int i = 0; i < repetitions; ++i) {
+      const auto start = std::chrono::steady_clock::now();
+      element_forces(rest, state, state.forces, room);
+      const auto middle = std::chrono::steady_clock::now();
+      element_forces(rest, state, state.forces, room, workspace.threads.get());
+      const auto end = std::chrono::steady_clock::now();
+      cost.seconds = std::min(cost.seconds, std::chrono::duration<double>(middle - start).count());
+      cost.two_seconds = std::min(cost.two_seconds, std::chrono::duration<double>(end - middle).count());
+    }
+    return cost;
+  };
+  return {time("surface", sphere_scene(101)), time("fem", block_scene(Model::fem, Integrator::explicit_substeps, 15))};
 }
 
 MachineLimit measure_machine() {

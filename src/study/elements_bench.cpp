@@ -30,6 +30,19 @@ void bench_substeps(JsonRows& json) {
   }
 }
 
+/// The same by two threads; on a machine that is busy the second may find no core.
+void bench_threads(JsonRows& json) {
+  std::printf("\nOne explicit substep of a large organ, ms\n\nmodel    elements  one thread  two threads  ratio\n");
+  for (const ThreadsCost& cost : time_threads()) {
+    std::printf("%-7s  %8d  %10.3f  %11.3f  %5.2f\n", cost.organ, cost.elements, 1e3 * cost.seconds,
+                1e3 * cost.two_seconds, cost.seconds / cost.two_seconds);
+    json.add(
+        text("\"measure\": \"threads\", \"model\": \"%s\", \"elements\": %d, \"ms\": %.6g, \"two_threads_ms\": "
+             "%.6g, \"ratio\": %.6g",
+             cost.organ, cost.elements, 1e3 * cost.seconds, 1e3 * cost.two_seconds, cost.seconds / cost.two_seconds));
+  }
+}
+
 }  // namespace
 
 bool bench_elements(BenchWords words, JsonRows& json) {
@@ -43,6 +56,7 @@ bool bench_elements(BenchWords words, JsonRows& json) {
                   to_string(cost.model), to_string(cost.integrator), cost.tetrahedra, ns));
   }
   bench_substeps(json);
+  bench_threads(json);
   return true;
 }
 

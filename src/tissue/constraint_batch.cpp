@@ -172,7 +172,17 @@ void add_chosen(const ConstraintBatches& batches, const ChosenConstraints& chose
 }
 
 ChosenBatches chosen(const std::vector<int>& list) {
-  return {list.data(), list.size()};
+  return {list.data(), list.size(), 0};
+}
+
+ChosenBatches chosen(const BatchRange& range) {
+  return {nullptr, range.count, range.first};
+}
+
+/// Of a ConstraintSelection, or of ConstraintRanges.
+template <class Selection>
+ChosenConstraints chosen_of(const Selection& selection) {
+  return {chosen(selection.pairs), chosen(selection.flaps), chosen(selection.triangles), chosen(selection.distances)};
 }
 
 }  // namespace
@@ -230,18 +240,21 @@ ConstraintBatches pack(const std::vector<DistanceElement>& distances, const std:
 
 void add_constraint_forces(const ConstraintBatches& batches, const VertexMotion* motions, VertexPull* pulls,
                            EnclosedShare* shares, InstructionSet set) {
-  const ChosenConstraints all = {{nullptr, batches.pairs.size()},
-                                 {nullptr, batches.flaps.size()},
-                                 {nullptr, batches.triangles.size()},
-                                 {nullptr, batches.distances.size()}};
-  add_chosen(batches, all, motions, pulls, shares, set);
+  const ConstraintRanges all = {{0, batches.pairs.size()},
+                                {0, batches.flaps.size()},
+                                {0, batches.triangles.size()},
+                                {0, batches.distances.size()}};
+  add_chosen(batches, chosen_of(all), motions, pulls, shares, set);
 }
 
 void add_constraint_forces(const ConstraintBatches& batches, const ConstraintSelection& selection,
                            const VertexMotion* motions, VertexPull* pulls, EnclosedShare* shares, InstructionSet set) {
-  const ChosenConstraints some = {chosen(selection.pairs), chosen(selection.flaps), chosen(selection.triangles),
-                                  chosen(selection.distances)};
-  add_chosen(batches, some, motions, pulls, shares, set);
+  add_chosen(batches, chosen_of(selection), motions, pulls, shares, set);
+}
+
+void add_constraint_forces(const ConstraintBatches& batches, const ConstraintRanges& ranges,
+                           const VertexMotion* motions, VertexPull* pulls, EnclosedShare* shares, InstructionSet set) {
+  add_chosen(batches, chosen_of(ranges), motions, pulls, shares, set);
 }
 
 }  // namespace tissue_sim

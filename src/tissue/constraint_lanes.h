@@ -7,11 +7,14 @@
 
 namespace tissue_sim {
 
-/// Which batches: `count` of them, those in `list` or, without one, the first.
+/// Which batches: `count` of them, those in `list` or, without one, from `first` on.
 struct ChosenBatches {
   const int* list;
   std::size_t count;
-  std::size_t operator[](std::size_t i) const { return list != nullptr ? static_cast<std::size_t>(list[i]) : i; }
+  std::size_t first = 0;
+  std::size_t operator[](std::size_t i) const {
+    return list != nullptr ? static_cast<std::size_t>(list[i]) : first + i;
+  }
 };
 
 struct ChosenConstraints {

@@ -158,10 +158,11 @@ TISSUE_SIM_INLINE void pull(const NeoHookeanBatch& batch, std::size_t l, float* 
   store(f, edges + 6 * stride);
 }
 
-/// Which batches: all, or those of a list.
-struct AllBatches {
+/// Which batches: some that follow each other, or those of a list.
+struct BatchesInARow {
+  std::size_t first;
   std::size_t count;
-  std::size_t operator[](std::size_t i) const { return i; }
+  std::size_t operator[](std::size_t i) const { return first + i; }
 };
 struct ListedBatches {
   const int* list;
@@ -264,7 +265,12 @@ const char* name(InstructionSet set) {
 
 void add_neo_hookean_forces(const NeoHookeanSolid& solid, const float* displacements, float* forces,
                             InstructionSet set) {
-  add_chosen(solid, AllBatches{solid.batches.size()}, displacements, forces, set);
+  add_chosen(solid, BatchesInARow{0, solid.batches.size()}, displacements, forces, set);
+}
+
+void add_neo_hookean_forces(const NeoHookeanSolid& solid, BatchRange batches, const float* displacements, float* forces,
+                            InstructionSet set) {
+  add_chosen(solid, BatchesInARow{batches.first, batches.count}, displacements, forces, set);
 }
 
 void add_neo_hookean_forces(const NeoHookeanSolid& solid, const std::vector<int>& batches, const float* displacements,

@@ -1,12 +1,13 @@
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cstdlib>
 #include <new>
 
 #include "simulation/solid_scenes.h"
 
 namespace {
-std::size_t allocations = 0;
+std::atomic<std::size_t> allocations{0};
 
 void* counted(std::size_t size) {
   ++allocations;
@@ -76,9 +77,10 @@ std::size_t allocations_once_warm(DepthScheme depth, CollidingSet set) {
 }
 
 /// A ball on top of a solid, down and up again, of which the first two times warm it.
-std::size_t allocations_of_a_solid(Organ organ, double top, double radius) {
+std::size_t allocations_of_a_solid(Organ organ, double top, double radius, int threads = 1) {
   organ.material.drag = 60.0;
   Simulation simulation(scene_of(organ, {round_ball(radius, 16)}));
+  if (threads > 1) simulation.workspace = build_workspace(simulation.world, threads);
   Pose above = ball_over_block(radius, -0.001);
   above.position.z() += top;
   simulation.start_at(above);
@@ -114,6 +116,12 @@ TEST(Allocation, NoneInAWarmStepOfASolid) {
       EXPECT_EQ(allocations_of_a_solid(soft_block(model, 3, integrator), 0.0, 0.001), 0u) << "thinner than a triangle";
     }
   }
+}
+
+TEST(Allocation, NoneInAWarmStepOfSeveralThreads) {
+  Organ organ = soft_block(Model::fem, 10);
+  organ.material.young = 500.0;
+  EXPECT_EQ(allocations_of_a_solid(organ, 0.0, 0.006, 3), 0u);
 }
 
 TEST(Allocation, NoneInAWarmStepOfAnEmbeddedSurface) {

@@ -67,6 +67,9 @@ int drop_unreferenced(TetrahedralMesh& mesh);
 /// surface is vertex i of the mesh. Needs sound indices and positive volumes.
 TriangleMesh take_surface(TetrahedralMesh& mesh);
 
+/// The points' indices along a Morton curve of 2^21 cells along the longest side of their box; ties by index.
+std::vector<int> along_curve(const std::vector<Vector3>& points);
+
 /// Sorts the tetrahedra along a Morton curve through their centroids, so that neighbours in memory are neighbours in
 /// space. Vertices stay as they are. Needs finite vertices.
 void sort_for_locality(TetrahedralMesh& mesh);

@@ -2,6 +2,7 @@
 
 #include "tissue_sim/contact/contact_point.h"
 #include "tissue_sim/simulation/state.h"
+#include "tissue_sim/simulation/threads.h"
 
 namespace tissue_sim {
 
@@ -18,7 +19,11 @@ double stiffening(const RestShape& rest, const FlatLists& tetrahedra_at, const s
 /// Packs the elements into the batches that element_forces() computes.
 void pack_elements(RestShape& rest);
 
-/// Room for element_forces(), one entry a vertex; empty where the organ's elements need none.
+/// Cuts the batches of a large organ into chunks, for several threads; not for a part of the organ at a time.
+void cut_elements(RestShape& rest);
+
+/// Room for element_forces(), one entry a vertex and then one a stand-in (see ElementChunks); empty where the organ's
+/// elements need none.
 struct ElementRoom {
   /// The vertex whose motion is taken from all others': an attached one, or where none is, any. An organ that has
   /// fallen far has no digits left for its strain in a float.
@@ -40,11 +45,14 @@ struct Moving {
   Moving(const OrganState& organ) : positions(organ.positions), velocities(organ.velocities) {}
 };
 
-/// Writes the forces (N) of all elements, damping included, on all vertices.
-void element_forces(const RestShape& rest, const Moving& moving, std::vector<Vector3>& forces, ElementRoom& room);
+/// Writes the forces (N) of all elements, damping included, on all vertices; those of a large organ by several threads
+/// if it is given them, to the same bits.
+void element_forces(const RestShape& rest, const Moving& moving, std::vector<Vector3>& forces, ElementRoom& room,
+                    Threads* threads = nullptr);
 
-/// The same for a part: writes the forces of its elements on its vertices, and leaves those on others. What the rest
-/// of the surface adds to the enclosed volume is what it added when it was last computed, or nothing if it is at rest.
+/// The same for a part of an organ whose elements are not cut into chunks: writes the forces of its elements on its
+/// vertices, and leaves those on others. What the rest of the surface adds to the enclosed volume is what it added when
+/// it was last computed, or nothing if it is at rest.
 void element_forces(const RestShape& rest, const Moving& moving, const ActiveElements& active,
                     std::vector<Vector3>& forces, ElementRoom& room);
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "tissue_sim/contact/contact_point.h"
@@ -46,12 +47,14 @@ struct OrganWorkspace {
 };
 
 struct Workspace {
+  std::unique_ptr<Threads> threads;  ///< none: one thread
   std::vector<OrganWorkspace> organs;
   std::vector<Pose> before;  ///< poses at the start and the end of the substep, one an instrument
   std::vector<Pose> now;
 };
 
-Workspace build_workspace(const World& world);
+/// `threads`: how many compute the forces of large organs; the states are the same bits for any number. See Threads.
+Workspace build_workspace(const World& world, int threads = 1);
 
 /// To be called after an organ was put somewhere from outside the step: its patches no longer hold it.
 void forget(OrganWorkspace& organ);

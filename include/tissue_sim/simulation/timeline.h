@@ -17,6 +17,7 @@ struct TimelineOptions {
   std::int64_t time_jump_threshold = 500'000'000;  ///< ns
   std::int64_t pose_timeout = 500'000'000;    ///< ns; an instrument this far behind the others is held, not waited for
   std::int64_t longest_gap = 10'000'000'000;  ///< ns; poses farther apart than this start a new run
+  int threads = 1;           ///< 1 to most_threads, for large organs; the states are the same bits for any number
   bool newest_only = false;  ///< true: steps go to the newest pose and the ones before it are passed over
 };
 

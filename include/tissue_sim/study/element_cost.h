@@ -39,6 +39,17 @@ std::vector<SubstepCost> time_substeps();
 
 MachineLimit measure_machine();
 
+/// One explicit substep of a large organ by one thread and by two, in turn.
+struct ThreadsCost {
+  const char* organ = "";
+  int elements = 0;
+  double seconds = 0.0;      ///< of one thread, the least of many repetitions
+  double two_seconds = 0.0;  ///< of two
+};
+
+/// The block in finer cells, 81,000 tetrahedra, as `fem`, and a sphere of 20,000 triangles as `surface`.
+std::vector<ThreadsCost> time_threads();
+
 /// s, what the substep would take if it only moved its bytes through the cache or only did its operations, whichever is
 /// longer.
 double least_possible(const SubstepCost& cost, const MachineLimit& limit);

@@ -105,6 +105,14 @@ struct ConstraintSelection {
   std::vector<int> distances;
 };
 
+/// Batches of each kind that follow each other.
+struct ConstraintRanges {
+  BatchRange pairs;
+  BatchRange flaps;
+  BatchRange triangles;
+  BatchRange distances;
+};
+
 /// Adds the elements' forces and normals to `pulls` and writes `shares`, one a batch of pairs, then one a batch of
 /// triangles. With the same bits for every instruction set: the lanes do not meet, and a vertex's forces are added in
 /// the order of the kinds, the batches and the lanes. Numbers below the smallest normal float count as zero.
@@ -118,6 +126,9 @@ void add_constraint_forces(const ConstraintBatches& batches, const VertexMotion*
 
 /// The same for some of the batches only: the same bits as if there were no others. The shares of others stay.
 void add_constraint_forces(const ConstraintBatches& batches, const ConstraintSelection& selection,
+                           const VertexMotion* motions, VertexPull* pulls, EnclosedShare* shares,
+                           InstructionSet set = instruction_set());
+void add_constraint_forces(const ConstraintBatches& batches, const ConstraintRanges& ranges,
                            const VertexMotion* motions, VertexPull* pulls, EnclosedShare* shares,
                            InstructionSet set = instruction_set());
 

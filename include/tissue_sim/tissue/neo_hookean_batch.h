@@ -27,6 +27,12 @@ struct NeoHookeanSolid {
 
 NeoHookeanSolid pack(const std::vector<NeoHookeanElement>& elements);
 
+/// Batches from `first` on.
+struct BatchRange {
+  std::size_t first = 0;
+  std::size_t count = 0;
+};
+
 /// Which registers forces are computed in: 16 bytes wide, which every x86-64 has (and other processors by the
 /// compiler's own means), or 32, or with AVX-512 32 and twice as many of them, which distances, areas and volumes have
 /// use for (see constraint_batch.h) and tetrahedra are not compiled for. All give the same bits: the lanes do not meet,
@@ -57,5 +63,7 @@ void add_neo_hookean_forces(const NeoHookeanSolid& solid, const float* displacem
 /// The same for some of the batches only, by their ascending indices: the same bits as if there were no others.
 void add_neo_hookean_forces(const NeoHookeanSolid& solid, const std::vector<int>& batches, const float* displacements,
                             float* forces, InstructionSet set = instruction_set());
+void add_neo_hookean_forces(const NeoHookeanSolid& solid, BatchRange batches, const float* displacements, float* forces,
+                            InstructionSet set = instruction_set());
 
 }  // namespace tissue_sim

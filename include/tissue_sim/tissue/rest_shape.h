@@ -7,6 +7,7 @@
 #include "tissue_sim/tissue/area.h"
 #include "tissue_sim/tissue/constraint_batch.h"
 #include "tissue_sim/tissue/distance.h"
+#include "tissue_sim/tissue/element_chunks.h"
 #include "tissue_sim/tissue/enclosed_volume.h"
 #include "tissue_sim/tissue/neo_hookean_batch.h"
 #include "tissue_sim/tissue/volume.h"
@@ -44,6 +45,7 @@ struct RestShape {
   std::vector<NeoHookeanElement> tetrahedra;  ///< `fem`
   NeoHookeanSolid packed;                     ///< the same tetrahedra for the explicit integrator, else empty
   ConstraintBatches constraints;              ///< the same distances, areas and volumes, likewise
+  ElementChunks chunks;                       ///< of both, where there are many
   EnclosedVolume enclosed;
   double stiffness_correction = 1.0;  ///< of `volume`, from a patch test on the organ's own mesh
   double damping_time = 0.0;  ///< s, of the tetrahedra: their forces are those of positions + damping_time velocities
