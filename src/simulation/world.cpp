@@ -36,7 +36,7 @@ constexpr double largest_wall_part = 0.2;
 /// shell all awake, with a radius of 6, 8, 10 and 12 bending lengths: the push goes around the tube, and a dome would
 /// do with
 /// 4. That shell all awake is too soft there by 9-12 % at a tolerance of 5 %, and by 7-8 % at 3 %. With the two
-/// together the force was within 3 % of that of the organ's own mesh all awake: 8 lengths at 5 %, 9 at 3 %.
+/// together the force was within 5 % of that of the organ's own mesh all awake: 8 lengths at 5 %, 9 at 3 %, 10 at 2 %.
 double wall_region_lengths(double tolerance) {
   return 8.0 + 2.0 * std::log(0.05 / tolerance);
 }
