@@ -444,6 +444,7 @@ void report_contacts(StepContext& context) {
     for (const int v : context.model().rest.triangles[triangle]) context.state.depths[v] = 0.0;
   }
   context.state.pressed.clear();
+  context.state.pressed.reserve(usual_contacts);
   for (OrganContact& contact : work.contacts) {
     context.state.pressed.push_back(contact.triangle);
     place(context.model(), contact.triangle, context.state);
