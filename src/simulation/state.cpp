@@ -68,7 +68,10 @@ std::uint64_t hash_state(const OrganModel& model, const OrganState& organ, std::
       seed = hash_doubles(organ.velocities[v].data(), 3, seed);
     }
     for (const LevelState& level : organ.levels) {
-      seed = hash_doubles(level.positions.front().data(), 3 * level.positions.size(), seed);
+      for (const int v : level.region.free) {
+        seed = hash_doubles(level.positions[v].data(), 3, seed);
+        seed = hash_doubles(level.velocities[v].data(), 3, seed);
+      }
     }
   } else {
     const std::size_t count = 3 * (organ.positions.size() - first);
@@ -111,9 +114,11 @@ void copy_state(const OrganModel& model, const OrganState& from, OrganState& to)
     for (std::size_t level = 0; level < from.levels.size(); ++level) {
       const LevelState& source = from.levels[level];
       LevelState& copy = to.levels[level];
-      copy.positions = source.positions;
-      copy.velocities = source.velocities;
-      copy.push = source.push;
+      for (const int v : source.region.active.vertices) {
+        copy.positions[v] = source.positions[v];
+        copy.velocities[v] = source.velocities[v];
+        copy.push[v] = source.push[v];
+      }
       copy.ahead = source.ahead;
       copy_region(source.region, copy.region);
     }

@@ -21,8 +21,8 @@ void rest_levels(const OrganModel& model, std::size_t pieces, OrganState& state)
 /// (m) of a vertex that fell asleep.
 double wake(const OrganModel& model, const std::vector<ContactPoint>& points, OrganState& state, LevelsRoom& room);
 
-/// Substeps of every coarser level in a step of `duration`; each divides that of the level before. Raises `substeps`,
-/// those of the organ's own tetrahedra, to a multiple.
+/// Substeps of every coarser level in a step of `duration` (s); each divides that of the level before. Raises
+/// `substeps`, those of the organ's own tetrahedra, to what makes all of them together cheapest.
 void share_substeps(const OrganModel& model, double duration, OrganState& state, int& substeps);
 
 /// Moves the coarser levels whose substep begins with substep `substep` (1 is the first) of the organ's own
