@@ -51,4 +51,10 @@ EdgeTriangleHit hit_edge_triangle(const Vector3& p, const Vector3& q, const std:
   return {height_p < 0.0 ? 1 : -1, t};
 }
 
+EdgeTriangleHit hit_plane(const Vector3& p, const Vector3& q, const Vector3& corner, const Vector3& normal) {
+  const double height_p = normal.dot(p - corner);
+  const double height_q = normal.dot(q - corner);
+  return {height_p < 0.0 ? 1 : -1, height_p / (height_p - height_q)};
+}
+
 }  // namespace tissue_sim

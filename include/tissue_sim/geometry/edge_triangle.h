@@ -19,4 +19,8 @@ struct EdgeTriangleHit {
 EdgeTriangleHit hit_edge_triangle(const Vector3& p, const Vector3& q, const std::array<const Vector3*, 3>& points,
                                   const Triangle& indices);
 
+/// The same where an edge is known to go through a triangle and its ends are not in the plane: by one of its corners
+/// and its area_normal(), to the same bits.
+EdgeTriangleHit hit_plane(const Vector3& p, const Vector3& q, const Vector3& corner, const Vector3& normal);
+
 }  // namespace tissue_sim
