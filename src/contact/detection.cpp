@@ -93,9 +93,9 @@ void cross_edge(const OrganSurface& organ, const InstrumentSurface& instrument, 
   const std::size_t begin = d.crossings.size();
   for (std::size_t pair = first_pair; pair < last_pair; ++pair) {
     const int triangle = d.pairs[pair].triangle;
-    const EdgeTriangleHit hit =
-        d.pairs[pair].sure ? hit_plane(p, q, instrument.planes[triangle].corner, instrument.planes[triangle].normal)
-                           : hit_triangle(p, q, instrument, triangle);
+    const TrianglePlane& plane = instrument.planes[triangle];
+    const EdgeTriangleHit hit = d.pairs[pair].within_rims ? hit_within_rims(p, q, plane.corner, plane.normal)
+                                                          : hit_triangle(p, q, instrument, triangle);
     if (hit.direction == 0) continue;
     d.crossings.push_back({edge, triangle, hit.t, hit.direction, p + hit.t * (q - p)});
     // Mostly there are one or two: they are put in order as they come.

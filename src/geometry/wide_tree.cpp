@@ -89,44 +89,38 @@ TISSUE_SIM_INLINE void cross(const Three<Lane>& a, const Three<Lane>& b, Three<L
   product.z = a.x * b.y - a.y * b.x;
 }
 
-/// The triangles of a leaf whose planes the edge p-q may go through: its ends do not surely lie on one side. `sure`
-/// keeps those where they surely lie on two.
+/// The triangles of a leaf whose planes the edge p-q may go through: its ends do not surely lie on one side.
 ///
 /// Coordinates up to `farthest`, the normal and all sums of their products are rounded: a height is wrong by less than
 /// 16 farthest * rounding.
 template <class Lane>
 TISSUE_SIM_INLINE unsigned straddled(const WideTree::Leaf& leaf, const FloatPoint& p, const FloatPoint& q,
-                                     float farthest, unsigned& sure) {
+                                     float farthest) {
   const float unsure = 32.0F * rounding * farthest;
   unsigned bits = 0;
-  unsigned sure_bits = 0;
   for (std::size_t l = 0; l < lanes; l += sizeof(Lane) / sizeof(float)) {
     const Lane& x = lane<Lane>(leaf.normal[0], l);
     const Lane& y = lane<Lane>(leaf.normal[1], l);
     const Lane& z = lane<Lane>(leaf.normal[2], l);
     const Lane height_p = x * p[0] + y * p[1] + z * p[2] - lane<Lane>(leaf.offset, l);
     const Lane height_q = x * q[0] + y * q[1] + z * q[2] - lane<Lane>(leaf.offset, l);
-    const auto p_above = height_p > unsure;
-    const auto q_above = height_q > unsure;
-    const auto p_below = height_p < -unsure;
-    const auto q_below = height_q < -unsure;
-    bits |= bits_of(~((p_above & q_above) | (p_below & q_below))) << l;
-    sure_bits |= bits_of((p_above & q_below) | (p_below & q_above)) << l;
+    const auto both_above = (height_p > unsure) & (height_q > unsure);
+    const auto both_below = (height_p < -unsure) & (height_q < -unsure);
+    bits |= bits_of(~(both_above | both_below)) << l;
   }
-  sure &= sure_bits;
   return bits;
 }
 
 /// The triangles of a leaf, of those whose boxes overlap the edge's, whose rims the line p-q does not surely pass on
-/// different sides.
+/// different sides. `within` becomes those of which it surely passes all rims on the same side: farther from them than
+/// what hit_edge_triangle() takes for rounding.
 ///
 /// Coordinates up to `farthest` are rounded, so the differences below, up to `length` long, are wrong by 3 farthest *
 /// rounding each, and what is made of them by less than farthest * length * (54 * along + 24 * length) * rounding,
-/// where `along` bounds the sides of q - p. `sure` keeps those whose rims it surely passes on the same side: farther
-/// from them than what hit_edge_triangle() takes for rounding.
+/// where `along` bounds the sides of q - p.
 template <class Lane>
 TISSUE_SIM_INLINE unsigned within_rims(const WideTree::Leaf& leaf, const FloatPoint& p, const FloatPoint& q,
-                                       float farthest, unsigned& sure) {
+                                       float farthest, unsigned& within) {
   const float x = q[0] - p[0];
   const float y = q[1] - p[1];
   const float z = q[2] - p[2];
@@ -134,7 +128,7 @@ TISSUE_SIM_INLINE unsigned within_rims(const WideTree::Leaf& leaf, const FloatPo
   const float length = along + leaf.extent;
   const float unsure = rounding * farthest * length * (128.0F * along + 64.0F * length);
   unsigned bits = 0;
-  unsigned sure_bits = 0;
+  unsigned bits_within = 0;
   for (std::size_t l = 0; l < lanes; l += sizeof(Lane) / sizeof(float)) {
     Three<Lane> a, b, c, ab, bc, ca;
     subtract(leaf.corners[0], l, p, a);
@@ -151,9 +145,9 @@ TISSUE_SIM_INLINE unsigned within_rims(const WideTree::Leaf& leaf, const FloatPo
     const Lane least = least_ab < rim_c ? least_ab : rim_c;
     const Lane most = most_ab > rim_c ? most_ab : rim_c;
     bits |= bits_of(~((most > unsure) & (least < -unsure))) << l;
-    sure_bits |= bits_of((least > unsure) | (most < -unsure)) << l;
+    bits_within |= bits_of((least > unsure) | (most < -unsure)) << l;
   }
-  sure &= sure_bits;
+  within = bits_within;
   return bits;
 }
 
@@ -247,14 +241,14 @@ TISSUE_SIM_INLINE void find_pairs(const WideTree& tree, const std::vector<FloatP
     if (!few) {
       for_each_leaf<Lane>(tree, edge.lower, edge.upper, room.stack, [&](const WideTree::Node& node, std::size_t l) {
         if (visits.size() < kept + 1) visits.resize(2 * kept + 64);
-        visits[kept++] = {e, node.child[l], 0, ~0U};
+        visits[kept++] = {e, node.child[l], 0, 0};
       });
       continue;
     }
     if (visits.size() < kept + most_near_leaves) visits.resize(2 * kept + most_near_leaves);
     for (const WideTree::Node& eight : room.near) {
       for (unsigned bits = overlapping<Lane>(eight, edge.lower, edge.upper); bits != 0; bits &= bits - 1) {
-        visits[kept++] = {e, eight.child[static_cast<std::size_t>(__builtin_ctz(bits))], 0, ~0U};
+        visits[kept++] = {e, eight.child[static_cast<std::size_t>(__builtin_ctz(bits))], 0, 0};
       }
     }
   }
@@ -272,19 +266,19 @@ TISSUE_SIM_INLINE void find_pairs(const WideTree& tree, const std::vector<FloatP
     const FloatEdge& edge = room.edges[static_cast<std::size_t>(visit.edge)];
     const WideTree::Node& leaf = tree.nodes[static_cast<std::size_t>(visit.leaf)];
     return overlapping<Lane>(leaf, edge.lower, edge.upper) &
-           straddled<Lane>(tree.leaves[static_cast<std::size_t>(leaf.leaf)], edge.p, edge.q, farthest, visit.sure);
+           straddled<Lane>(tree.leaves[static_cast<std::size_t>(leaf.leaf)], edge.p, edge.q, farthest);
   });
   keep_if([&](EdgeLeafVisit & visit) __attribute__((always_inline)) {
     const FloatEdge& edge = room.edges[static_cast<std::size_t>(visit.edge)];
     const WideTree::Node& leaf = tree.nodes[static_cast<std::size_t>(visit.leaf)];
-    return visit.triangles &
-           within_rims<Lane>(tree.leaves[static_cast<std::size_t>(leaf.leaf)], edge.p, edge.q, farthest, visit.sure);
+    return visit.triangles & within_rims<Lane>(tree.leaves[static_cast<std::size_t>(leaf.leaf)], edge.p, edge.q,
+                                               farthest, visit.within_rims);
   });
   for (std::size_t i = 0; i < kept; ++i) {
     const WideTree::Node& leaf = tree.nodes[static_cast<std::size_t>(visits[i].leaf)];
     for (unsigned bits = visits[i].triangles; bits != 0; bits &= bits - 1) {
       pairs.push_back({chosen[visits[i].edge], leaf.child[static_cast<std::size_t>(__builtin_ctz(bits))],
-                       (visits[i].sure & bits & -bits) != 0});
+                       (visits[i].within_rims & bits & -bits) != 0});
     }
   }
 }

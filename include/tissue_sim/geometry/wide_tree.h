@@ -57,15 +57,15 @@ WideTree build_wide_tree(const std::vector<Vector3>& vertices, const std::vector
 struct EdgeTrianglePair {
   int edge = 0;
   int triangle = 0;
-  bool sure = false;  ///< they do: no test is nearer to another answer than its rounding
+  bool within_rims = false;  ///< of the triangle, runs the line of the edge, surely: see hit_within_rims
 };
 
 /// An edge near to a leaf: numbers among those that are chosen, and among the nodes.
 struct EdgeLeafVisit {
   int edge = 0;
   int leaf = 0;
-  unsigned triangles = 0;  ///< lanes of the leaf, a bit each
-  unsigned sure = 0;       ///< of these: no test so far is in doubt
+  unsigned triangles = 0;    ///< lanes of the leaf, a bit each
+  unsigned within_rims = 0;  ///< of these: surely, as in EdgeTrianglePair
 };
 
 /// The ends of an edge and its box.
