@@ -34,6 +34,9 @@ constexpr double clear_margin = 1e-8;
 /// Of a patch's radius: how far it moves at least before its distance from the instrument is asked for again.
 constexpr double ask_again = 0.1;
 
+/// Of the same: how much farther the instrument is where its distance need not be exact.
+constexpr double clearly = 1.3;
+
 /// Whether the instrument's surface is nowhere in the ball that holds a patch. The distance of its middle from the
 /// instrument grows and shrinks by no more than the middle's way in the tip frame, so it is computed only when that way
 /// could have changed the answer.
@@ -42,8 +45,8 @@ bool is_clear(const InstrumentSurface& instrument, const Vector3& middle, double
   if (ball.radius - way > radius) return true;
   const double to_change = std::max(std::abs(ball.radius - radius), ask_again * radius);
   if (ball.radius >= 0.0 && !(way > to_change)) return false;
-  const ClosestOnMesh closest = closest_on_mesh(instrument.vertices, instrument.triangles, instrument.tree, middle,
-                                                std::numeric_limits<double>::max(), ball.triangle);
+  const ClosestOnMesh closest = free_around(instrument.vertices, instrument.triangles, instrument.tree, middle, radius,
+                                            clearly * radius, ball.triangle);
   if (closest.triangle < 0) return false;
   ball = {middle, std::sqrt(closest.squared_distance), closest.triangle};
   return ball.radius > radius;
@@ -71,6 +74,13 @@ void gather_pairs(const OrganSurface& organ, const InstrumentSurface& instrument
   });
 }
 
+EdgeTriangleHit hit_triangle(const Vector3& p, const Vector3& q, const InstrumentSurface& instrument, int triangle) {
+  const Triangle& corners = instrument.triangles[triangle];
+  return hit_edge_triangle(
+      p, q, {&instrument.vertices[corners[0]], &instrument.vertices[corners[1]], &instrument.vertices[corners[2]]},
+      corners);
+}
+
 /// Takes the crossings of one edge with the triangles of pairs first .. last - 1 and labels its ends by the first and
 /// the last of them.
 void cross_edge(const OrganSurface& organ, const InstrumentSurface& instrument, std::size_t first_pair,
@@ -83,10 +93,9 @@ void cross_edge(const OrganSurface& organ, const InstrumentSurface& instrument, 
   const std::size_t begin = d.crossings.size();
   for (std::size_t pair = first_pair; pair < last_pair; ++pair) {
     const int triangle = d.pairs[pair].triangle;
-    const Triangle& corners = instrument.triangles[triangle];
-    const EdgeTriangleHit hit = hit_edge_triangle(
-        p, q, {&instrument.vertices[corners[0]], &instrument.vertices[corners[1]], &instrument.vertices[corners[2]]},
-        corners);
+    const TrianglePlane& plane = instrument.planes[triangle];
+    const EdgeTriangleHit hit = d.pairs[pair].within_rims ? hit_within_rims(p, q, plane.corner, plane.normal)
+                                                          : hit_triangle(p, q, instrument, triangle);
     if (hit.direction == 0) continue;
     d.crossings.push_back({edge, triangle, hit.t, hit.direction, p + hit.t * (q - p)});
     // Mostly there are one or two: they are put in order as they come.

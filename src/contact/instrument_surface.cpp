@@ -46,7 +46,9 @@ InstrumentSurface build_instrument_surface(const TriangleMesh& mesh, bool closed
   for (const Vector3& v : mesh.vertices) surface.reach = std::max(surface.reach, v.norm());
 
   for (const auto& [a, b, c] : mesh.triangles) {
-    surface.normals.push_back(area_normal(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]).stableNormalized());
+    const Vector3 normal = area_normal(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]);
+    surface.planes.push_back({mesh.vertices[a], normal});
+    surface.normals.push_back(normal.stableNormalized());
   }
   surface.tree = build_wide_tree(mesh.vertices, mesh.triangles);
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {

@@ -51,4 +51,13 @@ EdgeTriangleHit hit_edge_triangle(const Vector3& p, const Vector3& q, const std:
   return {height_p < 0.0 ? 1 : -1, t};
 }
 
+EdgeTriangleHit hit_within_rims(const Vector3& p, const Vector3& q, const Vector3& corner, const Vector3& normal) {
+  const double height_p = normal.dot(p - corner);
+  const double height_q = normal.dot(q - corner);
+  if ((height_p < 0.0) == (height_q < 0.0)) return {};
+  const double t = height_p / (height_p - height_q);
+  if (!(t >= 0.0 && t <= 1.0)) return {};
+  return {height_p < 0.0 ? 1 : -1, t};
+}
+
 }  // namespace tissue_sim

@@ -112,14 +112,15 @@ TISSUE_SIM_INLINE unsigned straddled(const WideTree::Leaf& leaf, const FloatPoin
 }
 
 /// The triangles of a leaf, of those whose boxes overlap the edge's, whose rims the line p-q does not surely pass on
-/// different sides.
+/// different sides. `within` becomes those of which it surely passes all rims on the same side: farther from them than
+/// what hit_edge_triangle() takes for rounding.
 ///
 /// Coordinates up to `farthest` are rounded, so the differences below, up to `length` long, are wrong by 3 farthest *
 /// rounding each, and what is made of them by less than farthest * length * (54 * along + 24 * length) * rounding,
 /// where `along` bounds the sides of q - p.
 template <class Lane>
 TISSUE_SIM_INLINE unsigned within_rims(const WideTree::Leaf& leaf, const FloatPoint& p, const FloatPoint& q,
-                                       float farthest) {
+                                       float farthest, unsigned& within) {
   const float x = q[0] - p[0];
   const float y = q[1] - p[1];
   const float z = q[2] - p[2];
@@ -127,6 +128,7 @@ TISSUE_SIM_INLINE unsigned within_rims(const WideTree::Leaf& leaf, const FloatPo
   const float length = along + leaf.extent;
   const float unsure = rounding * farthest * length * (128.0F * along + 64.0F * length);
   unsigned bits = 0;
+  unsigned bits_within = 0;
   for (std::size_t l = 0; l < lanes; l += sizeof(Lane) / sizeof(float)) {
     Three<Lane> a, b, c, ab, bc, ca;
     subtract(leaf.corners[0], l, p, a);
@@ -138,10 +140,14 @@ TISSUE_SIM_INLINE unsigned within_rims(const WideTree::Leaf& leaf, const FloatPo
     const Lane rim_a = ab.x * x + ab.y * y + ab.z * z;
     const Lane rim_b = bc.x * x + bc.y * y + bc.z * z;
     const Lane rim_c = ca.x * x + ca.y * y + ca.z * z;
-    const auto some_left = (rim_a > unsure) | (rim_b > unsure) | (rim_c > unsure);
-    const auto some_right = (rim_a < -unsure) | (rim_b < -unsure) | (rim_c < -unsure);
-    bits |= bits_of(~(some_left & some_right)) << l;
+    const Lane least_ab = rim_a < rim_b ? rim_a : rim_b;
+    const Lane most_ab = rim_a < rim_b ? rim_b : rim_a;
+    const Lane least = least_ab < rim_c ? least_ab : rim_c;
+    const Lane most = most_ab > rim_c ? most_ab : rim_c;
+    bits |= bits_of(~((most > unsure) & (least < -unsure))) << l;
+    bits_within |= bits_of((least > unsure) | (most < -unsure)) << l;
   }
+  within = bits_within;
   return bits;
 }
 
@@ -235,14 +241,14 @@ TISSUE_SIM_INLINE void find_pairs(const WideTree& tree, const std::vector<FloatP
     if (!few) {
       for_each_leaf<Lane>(tree, edge.lower, edge.upper, room.stack, [&](const WideTree::Node& node, std::size_t l) {
         if (visits.size() < kept + 1) visits.resize(2 * kept + 64);
-        visits[kept++] = {e, node.child[l], 0};
+        visits[kept++] = {e, node.child[l], 0, 0};
       });
       continue;
     }
     if (visits.size() < kept + most_near_leaves) visits.resize(2 * kept + most_near_leaves);
     for (const WideTree::Node& eight : room.near) {
       for (unsigned bits = overlapping<Lane>(eight, edge.lower, edge.upper); bits != 0; bits &= bits - 1) {
-        visits[kept++] = {e, eight.child[static_cast<std::size_t>(__builtin_ctz(bits))], 0};
+        visits[kept++] = {e, eight.child[static_cast<std::size_t>(__builtin_ctz(bits))], 0, 0};
       }
     }
   }
@@ -256,22 +262,23 @@ TISSUE_SIM_INLINE void find_pairs(const WideTree& tree, const std::vector<FloatP
       kept += visit.triangles != 0 ? 1 : 0;
     }
   };
-  keep_if([&](const EdgeLeafVisit& visit) __attribute__((always_inline)) {
+  keep_if([&](EdgeLeafVisit & visit) __attribute__((always_inline)) {
     const FloatEdge& edge = room.edges[static_cast<std::size_t>(visit.edge)];
     const WideTree::Node& leaf = tree.nodes[static_cast<std::size_t>(visit.leaf)];
     return overlapping<Lane>(leaf, edge.lower, edge.upper) &
            straddled<Lane>(tree.leaves[static_cast<std::size_t>(leaf.leaf)], edge.p, edge.q, farthest);
   });
-  keep_if([&](const EdgeLeafVisit& visit) __attribute__((always_inline)) {
+  keep_if([&](EdgeLeafVisit & visit) __attribute__((always_inline)) {
     const FloatEdge& edge = room.edges[static_cast<std::size_t>(visit.edge)];
     const WideTree::Node& leaf = tree.nodes[static_cast<std::size_t>(visit.leaf)];
-    return visit.triangles &
-           within_rims<Lane>(tree.leaves[static_cast<std::size_t>(leaf.leaf)], edge.p, edge.q, farthest);
+    return visit.triangles & within_rims<Lane>(tree.leaves[static_cast<std::size_t>(leaf.leaf)], edge.p, edge.q,
+                                               farthest, visit.within_rims);
   });
   for (std::size_t i = 0; i < kept; ++i) {
     const WideTree::Node& leaf = tree.nodes[static_cast<std::size_t>(visits[i].leaf)];
     for (unsigned bits = visits[i].triangles; bits != 0; bits &= bits - 1) {
-      pairs.push_back({chosen[visits[i].edge], leaf.child[static_cast<std::size_t>(__builtin_ctz(bits))]});
+      pairs.push_back({chosen[visits[i].edge], leaf.child[static_cast<std::size_t>(__builtin_ctz(bits))],
+                       (visits[i].within_rims & bits & -bits) != 0});
     }
   }
 }
@@ -309,8 +316,10 @@ TISSUE_SIM_INLINE void squared_distances(const WideTree::Node& node, const Float
 
 /// Nearest first. A coordinate is rounded by at most (its size) * rounding, a difference once more: `slack` is more
 /// than all of it.
-template <class Lane>
-TISSUE_SIM_INLINE void closest(const WideTree& tree, const Vector3& from, ClosestSearch& search) {
+/// `near_enough(distance)` says by a squared distance whether what is no nearer has still to be looked at.
+template <class Lane, class NearEnough>
+TISSUE_SIM_INLINE void closest(const WideTree& tree, const Vector3& from, ClosestSearch& search,
+                               NearEnough&& near_enough) {
   struct Entry {
     int child;
     float distance;
@@ -319,9 +328,6 @@ TISSUE_SIM_INLINE void closest(const WideTree& tree, const Vector3& from, Closes
   const FloatPoint p = to_float(from);
   const float size = tree.farthest + std::max({std::abs(p[0]), std::abs(p[1]), std::abs(p[2])});
   const float slack = 8.0F * rounding * size;
-  const auto near_enough = [&](float distance) {
-    return static_cast<double>(std::min(distance, std::numeric_limits<float>::max())) <= search.bound;
-  };
   std::size_t waiting = 1;
   stack[0] = {0, 0.0F};
   while (waiting > 0) {
@@ -344,12 +350,54 @@ TISSUE_SIM_INLINE void closest(const WideTree& tree, const Vector3& from, Closes
   }
 }
 
+TISSUE_SIM_INLINE bool within(float squared_distance, double bound) {
+  return static_cast<double>(std::min(squared_distance, std::numeric_limits<float>::max())) <= bound;
+}
+
+template <class Lane>
+TISSUE_SIM_INLINE void closest(const WideTree& tree, const Vector3& from, ClosestSearch& search) {
+  closest<Lane>(
+      tree, from,
+      search, [&](float distance) __attribute__((always_inline)) { return within(distance, search.bound); });
+}
 __attribute__((noinline)) void closest_narrow(const WideTree& tree, const Vector3& from, ClosestSearch& search) {
   closest<Four>(tree, from, search);
 }
 #ifdef __x86_64__
 __attribute__((target("avx2"))) void closest_wide(const WideTree& tree, const Vector3& from, ClosestSearch& search) {
   closest<Eight>(tree, from, search);
+}
+#endif
+
+/// Squares of distances between which the nearest one is wanted exactly.
+struct Wanted {
+  double little;
+  double enough;
+
+  /// The square of the radius of a ball that is free once all that is nearer has been looked at and `best` was found.
+  double free_within(double best) const {
+    constexpr double share = 0.64;  // of a square: a fifth of the distance is given away
+    if (best > enough) return std::max(share * best, enough);
+    return best < little ? share * best : best;
+  }
+};
+
+template <class Lane>
+TISSUE_SIM_INLINE void free_ball(const WideTree& tree, const Vector3& from, const Wanted& wanted,
+                                 ClosestSearch& search) {
+  closest<Lane>(
+      tree, from, search, [&](float distance) __attribute__((always_inline)) {
+        return within(distance, wanted.free_within(search.bound));
+      });
+}
+__attribute__((noinline)) void free_ball_narrow(const WideTree& tree, const Vector3& from, const Wanted& wanted,
+                                                ClosestSearch& search) {
+  free_ball<Four>(tree, from, wanted, search);
+}
+#ifdef __x86_64__
+__attribute__((target("avx2"))) void free_ball_wide(const WideTree& tree, const Vector3& from, const Wanted& wanted,
+                                                    ClosestSearch& search) {
+  free_ball<Eight>(tree, from, wanted, search);
 }
 #endif
 
@@ -505,6 +553,25 @@ ClosestOnMesh closest_on_mesh(const std::vector<Vector3>& vertices, const std::v
   }
 #endif
   closest_narrow(tree, p, search);
+  return search.best;
+}
+
+ClosestOnMesh free_around(const std::vector<Vector3>& vertices, const std::vector<Triangle>& triangles,
+                          const WideTree& tree, const Vector3& p, double little, double enough, int guess,
+                          Registers registers) {
+  ClosestSearch search(vertices, triangles, p, std::numeric_limits<double>::max());
+  if (!p.allFinite()) return search.best;
+  if (guess >= 0) search.look_at(guess);
+  const Wanted wanted = {little * little, enough * enough};
+#ifdef __x86_64__
+  if (registers == Registers::wide) {
+    free_ball_wide(tree, p, wanted, search);
+  } else
+#endif
+  {
+    free_ball_narrow(tree, p, wanted, search);
+  }
+  search.best.squared_distance = wanted.free_within(search.best.squared_distance);
   return search.best;
 }
 

@@ -52,16 +52,45 @@ std::set<Pair> crossings(const TriangleMesh& mesh, const Edges& edges) {
   return found;
 }
 
-std::vector<Pair> found_pairs(const WideTree& tree, const Edges& edges, Registers registers) {
+std::vector<Pair> found_pairs(const WideTree& tree, const Edges& edges, Registers registers,
+                              std::vector<Pair>* sure = nullptr) {
   WideTreeRoom room;
   std::vector<EdgeTrianglePair> pairs;
   find_crossing_pairs(tree, edges.rounded, edges.edges, edges.all.data(), edges.all.size(), room, pairs, registers);
   std::vector<Pair> found;
-  for (const EdgeTrianglePair& pair : pairs) found.emplace_back(pair.edge, pair.triangle);
+  for (const EdgeTrianglePair& pair : pairs) {
+    found.emplace_back(pair.edge, pair.triangle);
+    if (sure && pair.within_rims) sure->push_back(found.back());
+  }
   return found;
 }
 
-void expect_all_crossings(const TriangleMesh& mesh, const Edges& edges, std::size_t& crossed, std::size_t& looked_at) {
+/// Of lines that surely run within the rims, whatever the registers, the plane alone tells where the edges go through.
+std::size_t expect_same_by_plane(const TriangleMesh& mesh, const WideTree& tree, const Edges& edges) {
+  std::vector<Pair> sure;
+  found_pairs(tree, edges, Registers::narrow, &sure);
+  for (const auto& [e, t] : sure) {
+    const auto& [i, j, k] = mesh.triangles[t];
+    const Vector3& a = mesh.vertices[i];
+    const Vector3& p = edges.points[2 * e];
+    const Vector3& q = edges.points[2 * e + 1];
+    const EdgeTriangleHit exact =
+        hit_edge_triangle(p, q, {&a, &mesh.vertices[j], &mesh.vertices[k]}, mesh.triangles[t]);
+    const EdgeTriangleHit by_plane = hit_within_rims(p, q, a, area_normal(a, mesh.vertices[j], mesh.vertices[k]));
+    EXPECT_EQ(by_plane.direction, exact.direction);
+    EXPECT_EQ(by_plane.t, exact.t);
+  }
+  for (const Registers registers : all_registers()) {
+    std::vector<Pair> other;
+    found_pairs(tree, edges, registers, &other);
+    EXPECT_EQ(other, sure);
+  }
+  return sure.size();
+}
+
+/// Returns of how many the lines surely run within the rims.
+std::size_t expect_all_crossings(const TriangleMesh& mesh, const Edges& edges, std::size_t& crossed,
+                                 std::size_t& looked_at) {
   const WideTree tree = build_wide_tree(mesh.vertices, mesh.triangles);
   const std::set<Pair> expected = crossings(mesh, edges);
   const std::vector<Pair> narrow = found_pairs(tree, edges, Registers::narrow);
@@ -71,12 +100,14 @@ void expect_all_crossings(const TriangleMesh& mesh, const Edges& edges, std::siz
   for (const Registers registers : all_registers()) EXPECT_EQ(found_pairs(tree, edges, registers), narrow);
   crossed += expected.size();
   looked_at += narrow.size();
+  return expect_same_by_plane(mesh, tree, edges);
 }
 
 TEST(WideTree, FindsEveryCrossingAndLittleElse) {
   Random random(1);
   std::size_t crossed = 0;
   std::size_t looked_at = 0;
+  std::size_t sure = 0;
   const std::vector<TriangleMesh> meshes = {make_octasphere(0.02, 4), make_torus(0.015, 0.004, 12),
                                             make_box(Vector3::Constant(0.03)), random_soup(random, 500, 0.2)};
   for (const TriangleMesh& mesh : meshes) {
@@ -90,10 +121,11 @@ TEST(WideTree, FindsEveryCrossingAndLittleElse) {
         const Vector3 p = middle + random_point(random, 0.3 * spread * size);
         edges.add(p, p + random_point(random, random_in(random, 0.0, 0.5 + spread) * size));
       }
-      expect_all_crossings(mesh, edges, crossed, looked_at);
+      sure += expect_all_crossings(mesh, edges, crossed, looked_at);
     }
   }
   EXPECT_GT(crossed, 2000u);
+  EXPECT_GT(sure, crossed - crossed / 10);
   EXPECT_LT(looked_at, crossed + crossed / 10);
 }
 
@@ -176,6 +208,39 @@ TEST(WideTree, ClosestPointIsThatOfBruteForceToTheBit) {
       }
     }
   }
+}
+
+TEST(WideTree, AFreeBallIsFreeAndExactWhereThatIsAskedFor) {
+  Random random(6);
+  int given_away = 0;
+  for (const TriangleMesh& mesh : {make_octasphere(0.02, 3), random_soup(random, 200, 0.2)}) {
+    const WideTree tree = build_wide_tree(mesh.vertices, mesh.triangles);
+    const double size = bounds_of(mesh.vertices).size().maxCoeff();
+    for (int i = 0; i < 300; ++i) {
+      const Vector3 p = random_point(random, size);
+      const double little = random_in(random, 0.0, 0.5 * size);
+      const double enough = 1.3 * little;
+      const double distance = std::sqrt(closest_on_mesh(mesh.vertices, mesh.triangles, tree, p, 1e3).squared_distance);
+      for (const int guess : {-1, i % static_cast<int>(mesh.triangles.size())}) {
+        const ClosestOnMesh free =
+            free_around(mesh.vertices, mesh.triangles, tree, p, little, enough, guess, Registers::narrow);
+        const double radius = std::sqrt(free.squared_distance);
+        EXPECT_GE(free.triangle, 0);
+        EXPECT_LE(radius, distance * (1.0 + 1e-12));
+        EXPECT_GE(radius, 0.79 * distance);
+        EXPECT_EQ(radius > little, distance > little);
+        EXPECT_GE(radius, (distance > little ? std::min(distance, enough) : 0.79 * distance) * (1.0 - 1e-12));
+        given_away += radius < 0.9 * distance ? 1 : 0;
+        for (const Registers registers : all_registers()) {
+          const ClosestOnMesh same =
+              free_around(mesh.vertices, mesh.triangles, tree, p, little, enough, guess, registers);
+          EXPECT_EQ(same.triangle, free.triangle);
+          EXPECT_EQ(same.squared_distance, free.squared_distance);
+        }
+      }
+    }
+  }
+  EXPECT_GT(given_away, 100);
 }
 
 TEST(WideTree, OfAnySizeHoldsEveryTriangleOnce) {

@@ -9,6 +9,12 @@
 
 namespace tissue_sim {
 
+/// The plane of a triangle as the exact tests compute it.
+struct TrianglePlane {
+  Vector3 corner;  ///< the first
+  Vector3 normal;  ///< m^2, area_normal()
+};
+
 /// One rigid piece of an instrument, ready for contact. Everything is in the frame of the instrument's tip and is built
 /// once: organs are carried into this frame, so its tree never moves. Metres.
 struct InstrumentSurface {
@@ -16,6 +22,7 @@ struct InstrumentSurface {
   std::vector<Triangle> triangles;
   MeshTopology topology;
   std::vector<Vector3> normals;         ///< unit, one a triangle; zero where it is degenerate
+  std::vector<TrianglePlane> planes;    ///< one a triangle
   std::vector<Vector3> vertex_normals;  ///< unit, one a vertex, angle-weighted
   std::vector<double> radii;  ///< m, one a vertex: of the curve of the surface there, 0 at corners and sharp edges
   WideTree tree;

@@ -19,4 +19,8 @@ struct EdgeTriangleHit {
 EdgeTriangleHit hit_edge_triangle(const Vector3& p, const Vector3& q, const std::array<const Vector3*, 3>& points,
                                   const Triangle& indices);
 
+/// The same, to the same bits, where the line through p and q is known to pass all rims of a triangle on one side, by
+/// more than rounding: then its plane decides, given by a corner and area_normal().
+EdgeTriangleHit hit_within_rims(const Vector3& p, const Vector3& q, const Vector3& corner, const Vector3& normal);
+
 }  // namespace tissue_sim

@@ -57,13 +57,15 @@ WideTree build_wide_tree(const std::vector<Vector3>& vertices, const std::vector
 struct EdgeTrianglePair {
   int edge = 0;
   int triangle = 0;
+  bool within_rims = false;  ///< of the triangle, runs the line of the edge, surely: see hit_within_rims
 };
 
 /// An edge near to a leaf: numbers among those that are chosen, and among the nodes.
 struct EdgeLeafVisit {
   int edge = 0;
   int leaf = 0;
-  unsigned triangles = 0;  ///< lanes of the leaf, a bit each
+  unsigned triangles = 0;    ///< lanes of the leaf, a bit each
+  unsigned within_rims = 0;  ///< of these: surely, as in EdgeTrianglePair
 };
 
 /// The ends of an edge and its box.
@@ -87,6 +89,13 @@ struct WideTreeRoom {
 void find_crossing_pairs(const WideTree& tree, const std::vector<FloatPoint>& points, const std::vector<Edge>& edges,
                          const int* chosen, std::size_t count, WideTreeRoom& room, std::vector<EdgeTrianglePair>& pairs,
                          Registers registers = widest_registers());
+
+/// A ball around p that the surface does not reach into: `squared_distance` is the square of its radius, and `triangle`
+/// one near to p, or -1 where p is not a number. The largest such ball where its radius is between `little` and
+/// `enough` (m); else at least four fifths of that, on the same side of both: that takes a fraction of the search.
+ClosestOnMesh free_around(const std::vector<Vector3>& vertices, const std::vector<Triangle>& triangles,
+                          const WideTree& tree, const Vector3& p, double little, double enough, int guess = -1,
+                          Registers registers = widest_registers());
 
 /// As closest_on_mesh.
 ClosestOnMesh closest_on_mesh(const std::vector<Vector3>& vertices, const std::vector<Triangle>& triangles,
