@@ -198,14 +198,16 @@ TEST(WallRegion, ComesBackToRestWhereItWasPressed) {
   simulation.slide_to(ball_at(0.08, 0.0015), 1500);
   EXPECT_EQ(simulation.organ().centres[0].size(), 1u);
   for (std::size_t v = static_cast<std::size_t>(rest.first_simulated); v < rest.positions.size(); ++v) {
-    if (rest.positions[v].x() < 0.02) EXPECT_EQ(simulation.organ().positions[v], rest.positions[v]);
+    if (rest.positions[v].x() < 0.02) {
+      EXPECT_EQ(simulation.state.organs[0].positions[v], rest.positions[v]);
+    }
   }
   simulation.slide_to(ball_at(0.08, -0.05), 20);
   for (int i = 0; i < 6000 && !simulation.organ().asleep; ++i) simulation.go_to(ball_at(0.08, -0.05));
   EXPECT_TRUE(simulation.organ().asleep);
   place_surface(simulation.world.organs[0], simulation.state.organs[0]);
   for (std::size_t v = 0; v < rest.positions.size(); ++v) {
-    EXPECT_LT((simulation.organ().positions[v] - rest.positions[v]).norm(), 1e-5);
+    EXPECT_LT((simulation.state.organs[0].positions[v] - rest.positions[v]).norm(), 1e-5);
   }
 }
 
