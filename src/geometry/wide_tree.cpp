@@ -172,10 +172,11 @@ TISSUE_SIM_INLINE void for_each_leaf(const WideTree& tree, const FloatPoint& low
   }
 }
 
+/// No number is on either side of a NaN: an edge that reaches to infinity overlaps every box with sides.
 void clear(WideTree::Node& node) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    node.lower[axis].fill(infinite);
-    node.upper[axis].fill(-infinite);
+    node.lower[axis].fill(std::numeric_limits<float>::quiet_NaN());
+    node.upper[axis].fill(std::numeric_limits<float>::quiet_NaN());
   }
   node.child.fill(-1);
 }

@@ -129,6 +129,25 @@ TEST(WideTree, FindsEveryCrossingAndLittleElse) {
   EXPECT_LT(looked_at, crossed + crossed / 10);
 }
 
+/// An organ that ran away has edges that reach to infinity, and those overlap every box that has sides.
+TEST(WideTree, EdgesToInfinityMeetTrianglesThatAreThere) {
+  const TriangleMesh mesh = make_octasphere(0.02, 2);
+  const WideTree tree = build_wide_tree(mesh.vertices, mesh.triangles);
+  constexpr double far = 1e300;
+  Edges edges;
+  edges.add({-far, -far, -far}, {far, far, far});
+  edges.add({-far, 0.0, 0.0}, {far, 0.0, 0.0});
+  edges.add({0.0, 0.0, 0.0}, {0.0, far, 0.0});
+  edges.add(Vector3::Constant(std::numeric_limits<double>::quiet_NaN()), {far, far, far});
+  for (const Registers registers : all_registers()) {
+    const std::vector<Pair> pairs = found_pairs(tree, edges, registers);
+    EXPECT_FALSE(pairs.empty());
+    for (const Pair& pair : pairs) {
+      EXPECT_TRUE(pair.second >= 0 && pair.second < static_cast<int>(mesh.triangles.size())) << pair.second;
+    }
+  }
+}
+
 /// Ends exactly on triangles, edges through rims and corners, edges in the plane, no length.
 TEST(WideTree, FindsCrossingsThatRoundingDecides) {
   Random random(2);

@@ -29,7 +29,7 @@ struct WideTree {
   static constexpr std::size_t lanes = 8;
   using Row = std::array<float, lanes>;
 
-  /// Lanes without a child are empty boxes. The children of a leaf are triangles, those of other nodes are nodes.
+  /// Lanes without a child are boxes that nothing overlaps. The children of a leaf are triangles, those of other nodes are nodes.
   struct alignas(32) Node {
     std::array<Row, 3> lower;
     std::array<Row, 3> upper;
