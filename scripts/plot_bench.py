@@ -87,7 +87,8 @@ def draw_scale(rows, path):
             ticks.set_major_formatter(plain)
             ticks.set_minor_formatter(NullFormatter())
         axis.grid(alpha=0.25, which="both", linewidth=0.6)
-        axis.legend(frameon=False, fontsize=9)
+        free = (0.0, 0.35) if axis is time else (0.42, 0.14)
+        axis.legend(frameon=False, fontsize=9, loc="center left", bbox_to_anchor=free)
     figure.tight_layout()
     figure.savefig(path, metadata={"Date": None})
     plt.close(figure)
@@ -147,6 +148,7 @@ def main():
     parser.add_argument("--out", required=True, type=pathlib.Path,
                         help="folder for the pictures (SVG) and the tables (performance_<bench>.md)")
     arguments = parser.parse_args()
+    arguments.out.mkdir(parents=True, exist_ok=True)
     plt.rcParams["svg.hashsalt"] = "tissue_sim"  # the same picture for the same numbers, byte for byte
     draw = {"paper": draw_paper, "scale": draw_scale}
     for name in arguments.json:
