@@ -91,21 +91,13 @@ struct Place {
   }
 };
 
-double longest_edge(const TetrahedralMesh& solid, const Tetrahedron& t) {
-  double longest = 0.0;
-  for (std::size_t i = 0; i < 4; ++i) {
-    for (std::size_t j = i + 1; j < 4; ++j) {
-      longest = std::max(longest, (solid.vertices[t[j]] - solid.vertices[t[i]]).squaredNorm());
-    }
-  }
-  return std::sqrt(longest);
-}
-
 /// Calls visit(point) for points that share the tetrahedron's volume evenly: those of a cube, folded into one of its
 /// six tetrahedra.
 template <class Visit>
 int sample(const TetrahedralMesh& solid, const Tetrahedron& t, double spacing, Visit&& visit) {
-  const int across = std::max(1, static_cast<int>(std::ceil(longest_edge(solid, t) / spacing)));
+  const double longest = std::sqrt(
+      squared_longest_edge(solid.vertices[t[0]], solid.vertices[t[1]], solid.vertices[t[2]], solid.vertices[t[3]]));
+  const int across = std::max(1, static_cast<int>(std::ceil(longest / spacing)));
   for (int i = 0; i < across; ++i) {
     for (int j = 0; j < across; ++j) {
       for (int k = 0; k < across; ++k) {

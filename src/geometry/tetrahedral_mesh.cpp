@@ -165,9 +165,13 @@ std::vector<int> along_curve(const std::vector<Vector3>& points) {
   return indices;
 }
 
+double squared_longest_edge(const Vector3& a, const Vector3& b, const Vector3& c, const Vector3& d) {
+  return std::max({(b - a).squaredNorm(), (c - a).squaredNorm(), (d - a).squaredNorm(), (c - b).squaredNorm(),
+                   (d - b).squaredNorm(), (d - c).squaredNorm()});
+}
+
 bool is_flat(const Vector3& a, const Vector3& b, const Vector3& c, const Vector3& d) {
-  const double longest2 = std::max({(b - a).squaredNorm(), (c - a).squaredNorm(), (d - a).squaredNorm(),
-                                    (c - b).squaredNorm(), (d - b).squaredNorm(), (d - c).squaredNorm()});
+  const double longest2 = squared_longest_edge(a, b, c, d);
   return !(std::abs(tetrahedron_volume(a, b, c, d)) > flat_ratio * longest2 * std::sqrt(longest2));
 }
 

@@ -58,17 +58,6 @@ Message& writable(boost::shared_ptr<Message>& message) {
   return *message;
 }
 
-void add(StepProfile& sum, const StepProfile& step) {
-  sum.refit += step.refit;
-  sum.detection += step.detection;
-  sum.penetration += step.penetration;
-  sum.propagation += step.propagation;
-  sum.response += step.response;
-  sum.deformation += step.deformation;
-  sum.health += step.health;
-  sum.total += step.total;
-}
-
 }  // namespace
 
 Node::Node(const NodeParameters& parameters)
@@ -200,7 +189,7 @@ void Node::hold_in_realtime() {
 void Node::after_step(bool holding) {
   const StepReport& report = timeline_.report();
   timeline_.set_forces_wanted(forces_wanted());  // in the next step: a subscriber may have come or gone
-  add(profile_, report.profile);
+  add(report.profile, 1.0, profile_);
   ++period_steps_;
   // Zero before the first step, and a new run goes back: neither is time that was simulated.
   if (last_step_stamp_ > 0 && report.stamp > last_step_stamp_) period_nanoseconds_ += report.stamp - last_step_stamp_;

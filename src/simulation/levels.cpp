@@ -106,8 +106,7 @@ double band_stiffness(double reach, double mass, double modulus_times_edge, doub
   return std::min(3.0 * modulus_times_edge * reach * reach / (1.01 - std::min(reach, 1.0)), 0.25 * mass / (dt * dt));
 }
 
-void wake_level(const OrganModel& model, std::size_t level, const std::vector<ContactPoint>& points, OrganState& state,
-                RegionRoom& room, double& farthest) {
+void wake_level(const OrganModel& model, std::size_t level, OrganState& state, RegionRoom& room, double& farthest) {
   const LevelView at = view(model, level, state);
   recentre(model.regions[level], at.shape, state.centres, at.region, room);
   for (const int v : room.fallen) {
@@ -122,7 +121,6 @@ void wake_level(const OrganModel& model, std::size_t level, const std::vector<Co
     at.positions[v] = at.shape.positions[v] + to.displacement;
     at.velocities[v] = to.velocity;
   }
-  static_cast<void>(points);
   follow(model, level, state);
 }
 
@@ -239,10 +237,6 @@ double move_level(const OrganModel& model, std::size_t level, const Vector3& gra
   return std::sqrt(fastest);
 }
 
-}  // namespace
-
-namespace {
-
 /// What a substep of an organ's own tetrahedra costs over that of a coarser level, about, as both are awake.
 constexpr int own_cost = 4;
 
@@ -314,7 +308,7 @@ double wake(const OrganModel& model, const std::vector<ContactPoint>& points, Or
   }
   double farthest = 0.0;
   for (std::size_t level = model.levels.size(); level-- > 0;) {
-    wake_level(model, level, points, state, room.regions[level], farthest);
+    wake_level(model, level, state, room.regions[level], farthest);
   }
   return farthest;
 }
@@ -404,21 +398,26 @@ void place(const OrganModel& model, const int* first, const int* last, OrganStat
   }
 }
 
+namespace {
+
+void place_first(const OrganModel& model, int count, OrganState& state) {
+  if (!moves_less_than_it_shows(model)) return;
+  for (int v = 0; v < count; ++v) place(model, &v, &v + 1, state);
+}
+
+}  // namespace
+
 void place(const OrganModel& model, int triangle, OrganState& state) {
   const Triangle& corners = model.rest.triangles[triangle];
   if (moves_less_than_it_shows(model)) place(model, corners.data(), corners.data() + corners.size(), state);
 }
 
 void place_surface(const OrganModel& model, OrganState& state) {
-  if (!moves_less_than_it_shows(model)) return;
-  for (int v = 0; v < model.rest.surface_vertices; ++v) place(model, &v, &v + 1, state);
+  place_first(model, model.rest.surface_vertices, state);
 }
 
 void place_all(const OrganModel& model, OrganState& state) {
-  if (!moves_less_than_it_shows(model)) return;
-  for (int v = 0; v < static_cast<int>(state.positions.size()); ++v) {
-    if (v < model.rest.first_simulated || !model.levels.empty()) place(model, &v, &v + 1, state);
-  }
+  place_first(model, static_cast<int>(state.positions.size()), state);
 }
 
 }  // namespace tissue_sim

@@ -32,14 +32,6 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-void add(const StepProfile& step, double part, StepProfile& sum) {
-  for (double StepProfile::*stage :
-       {&StepProfile::refit, &StepProfile::detection, &StepProfile::penetration, &StepProfile::propagation,
-        &StepProfile::response, &StepProfile::deformation, &StepProfile::health, &StepProfile::total}) {
-    sum.*stage += part * (step.*stage);
-  }
-}
-
 /// Where an instrument presses: a vertex of an organ, and the way out of the surface there.
 struct FreePlace {
   Vector3 point;

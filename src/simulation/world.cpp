@@ -104,14 +104,12 @@ bool is_supported(const RestShape& rest, double reach) {
   if (held.empty()) return false;
   AabbTree tree;
   tree.build(held);
-  for (const Triangle& corners : rest.wall_triangles()) {
-    for (const int v : corners) {
-      Box place;
-      place.add(rest.positions[v]);
-      bool near = false;
-      tree.for_each_near(place.grown(reach), [&](int) { near = true; });
-      if (!near) return false;
-    }
+  for (std::size_t v = static_cast<std::size_t>(rest.first_simulated); v < rest.positions.size(); ++v) {
+    Box place;
+    place.add(rest.positions[v]);
+    bool near = false;
+    tree.for_each_near(place.grown(reach), [&](int) { near = true; });
+    if (!near) return false;
   }
   return true;
 }

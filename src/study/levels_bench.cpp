@@ -120,10 +120,7 @@ struct Way {
     milliseconds.push_back(thread_milliseconds() - start);
     forces.push_back(report.wrenches.front().force.norm());
     recoveries += report.recovered ? 1 : 0;
-    for (double StepProfile::*stage : {&StepProfile::refit, &StepProfile::detection, &StepProfile::response,
-                                       &StepProfile::deformation, &StepProfile::health}) {
-      sum.*stage += report.profile.*stage;
-    }
+    add(report.profile, 1.0, sum);
   }
 
   std::vector<Vector3> displacements() {

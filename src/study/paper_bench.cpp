@@ -27,7 +27,7 @@ PaperResult run_plain_test(const PaperTest& test, Approach approach) {
     if (plain.contacts.empty()) continue;
     ++result.steps_with_contact;
     result.contacts += static_cast<std::int64_t>(plain.contacts.size());
-    add(plain.profile, sum);
+    add(plain.profile, 1.0, sum);
   }
   result.mean = divided(sum, result.steps_with_contact);
   return result;

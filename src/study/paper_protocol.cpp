@@ -112,21 +112,10 @@ Scene paper_scene(const PaperTest& test, Approach approach) {
   return scene;
 }
 
-void add(const StepProfile& step, StepProfile& sum) {
-  sum.refit += step.refit;
-  sum.detection += step.detection;
-  sum.penetration += step.penetration;
-  sum.propagation += step.propagation;
-  sum.response += step.response;
-  sum.deformation += step.deformation;
-  sum.health += step.health;
-  sum.total += step.total;
-}
-
 StepProfile divided(const StepProfile& sum, int steps) {
-  const double n = std::max(1, steps);
-  return {sum.refit / n,    sum.detection / n,   sum.penetration / n, sum.propagation / n,
-          sum.response / n, sum.deformation / n, sum.health / n,      sum.total / n};
+  StepProfile mean;
+  add(sum, 1.0 / std::max(1, steps), mean);
+  return mean;
 }
 
 PaperResult run_paper_test(const PaperTest& test, Approach approach) {
@@ -143,7 +132,7 @@ PaperResult run_paper_test(const PaperTest& test, Approach approach) {
       if (report.contacts.empty()) continue;
       ++result.steps_with_contact;
       result.contacts += static_cast<std::int64_t>(report.contacts.size());
-      add(report.profile, sum);
+      add(report.profile, 1.0, sum);
     }
   }
   result.mean = divided(sum, result.steps_with_contact);

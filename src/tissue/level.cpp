@@ -92,7 +92,7 @@ Level build_level(const Organ& organ, const RestShape& finest, const RestShape& 
     for (const int corner : corners) shape.mass[corner] += 0.25 * mass;
     shape.tetrahedra.push_back(NeoHookeanElement::at_rest(corners, x, {fill * moduli.mu, fill * moduli.lambda}));
   }
-  shape.attached.assign(shape.positions.size(), 0);
+  shape.attached.assign(shape.positions.size(), 0);  // pins hold it
   add_pins(finest, lattice, level);
   for (std::size_t v = 0; v < level.bearing.weights.size(); ++v) {
     std::array<double, 4>& weights = level.bearing.weights[v];
@@ -101,7 +101,7 @@ Level build_level(const Organ& organ, const RestShape& finest, const RestShape& 
     for (double& weight : weights) weight /= sum;
   }
   for (std::size_t v = 0; v < shape.mass.size(); ++v) {
-    shape.inverse_mass.push_back(shape.attached[v] ? 0.0 : 1.0 / shape.mass[v]);
+    shape.inverse_mass.push_back(1.0 / shape.mass[v]);
     shape.total_mass += shape.mass[v];
   }
   shape.fastest_frequency = fastest_frequency(shape);

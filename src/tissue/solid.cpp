@@ -17,12 +17,6 @@ constexpr std::array<std::array<int, 2>, 6> corner_pairs = {{{0, 1}, {0, 2}, {0,
 
 using Corners = std::array<Vector3, 4>;
 
-double longest_edge(const Corners& x) {
-  double longest = 0.0;
-  for (const auto& [i, j] : corner_pairs) longest = std::max(longest, (x[j] - x[i]).squaredNorm());
-  return std::sqrt(longest);
-}
-
 double smallest_height(const Corners& x, double volume) {
   const double twice_largest_face =
       std::max({area_normal(x[0], x[1], x[2]).norm(), area_normal(x[0], x[1], x[3]).norm(),
@@ -32,7 +26,8 @@ double smallest_height(const Corners& x, double volume) {
 
 /// 1, or less for a sliver.
 double softened(const Corners& x, double volume) {
-  const double ratio = smallest_height(x, volume) / (sliver_height * longest_edge(x));
+  const double longest = std::sqrt(squared_longest_edge(x[0], x[1], x[2], x[3]));
+  const double ratio = smallest_height(x, volume) / (sliver_height * longest);
   return std::min(1.0, ratio * ratio);
 }
 

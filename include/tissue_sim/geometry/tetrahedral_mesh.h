@@ -31,6 +31,9 @@ inline double tetrahedron_volume(const TetrahedralMesh& mesh, const Tetrahedron&
   return tetrahedron_volume(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]], mesh.vertices[t[3]]);
 }
 
+/// m^2.
+double squared_longest_edge(const Vector3& a, const Vector3& b, const Vector3& c, const Vector3& d);
+
 /// Without volume: below 1e-12 of the cube of the longest edge (a regular one has 0.118 of it), which is where the
 /// volume is rounding error. NaN counts as flat.
 bool is_flat(const Vector3& a, const Vector3& b, const Vector3& c, const Vector3& d);

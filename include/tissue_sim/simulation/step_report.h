@@ -26,6 +26,15 @@ struct StepProfile {
   double total = 0.0;
 };
 
+/// Adds `part` of every stage of a step to those of a sum.
+inline void add(const StepProfile& step, double part, StepProfile& sum) {
+  for (double StepProfile::*stage :
+       {&StepProfile::refit, &StepProfile::detection, &StepProfile::penetration, &StepProfile::propagation,
+        &StepProfile::response, &StepProfile::deformation, &StepProfile::health, &StepProfile::total}) {
+    sum.*stage += part * (step.*stage);
+  }
+}
+
 /// What one step did. Valid until the next one.
 struct StepReport {
   std::uint64_t step = 0;     ///< counts from 1; never goes back, not even at a reset

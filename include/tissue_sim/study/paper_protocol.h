@@ -41,8 +41,7 @@ Pose paper_pose(const Vector3& centre);
 /// 1-6.
 Scene paper_scene(const PaperTest& test, Approach approach);
 
-/// Of profiles over steps: their sum, and that divided by how many there were.
-void add(const StepProfile& step, StepProfile& sum);
+/// The mean of profiles, from their sum and how many there were.
 StepProfile divided(const StepProfile& sum, int steps);
 
 struct PaperResult {
