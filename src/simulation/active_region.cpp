@@ -51,6 +51,20 @@ void sort_out(const ConstraintBatches& constraints, std::vector<int>& batches, C
   take(constraints.distances.size(), selection.distances);
 }
 
+/// Boxes around centres that follow each other in the list and are near each other.
+template <class Visit>
+void for_each_box(const std::vector<Vector3>& centres, double near, const Visit& visit) {
+  Box box;
+  for (std::size_t i = 0; i < centres.size(); ++i) {
+    if (i > 0 && (centres[i] - centres[i - 1]).norm() > near) {
+      visit(box);
+      box = Box();
+    }
+    box.add(centres[i]);
+  }
+  if (!centres.empty()) visit(box);
+}
+
 }  // namespace
 
 RegionModel build_region_model(const RestShape& shape, double radius, double edge) {
@@ -66,6 +80,7 @@ RegionModel build_region_model(const RestShape& shape, double radius, double edg
 
 RegionModel build_wall_region_model(const RestShape& shape, double radius) {
   RegionModel model;
+  model.wall = true;
   model.radius = radius;
   std::vector<Box> boxes;
   model.vertices.first.push_back(0);
@@ -84,31 +99,22 @@ void prepare(RegionRoom& room, const RestShape& shape) {
   room.batch_stamp.assign(count_batches(shape), 0);
 }
 
-void recentre(const RegionModel& model, const RestShape& shape, const std::vector<std::vector<Vector3>>& centres,
-              ActiveRegion& region, RegionRoom& room) {
+void recentre(const RegionModel& model, const RestShape& shape, ActiveRegion& region, RegionRoom& room) {
   ++room.stamp;
   room.woken.clear();
-  room.fallen.clear();
+  room.batches.clear();
+  for (const int v : region.driven) region.mark[v] = Part::asleep;
+  region.driven.clear();
+  std::vector<int>& before = room.fallen;  // becomes those of them that are not free again
+  before.clear();
+  before.swap(region.free);
   const auto distance_to = [&](const Vector3& place) {
     double nearest = 1e300;
-    for (const std::vector<Vector3>& of_piece : centres) {
-      for (const Vector3& centre : of_piece) nearest = std::min(nearest, (place - centre).squaredNorm());
-    }
+    for (const Vector3& centre : region.centres) nearest = std::min(nearest, (place - centre).squaredNorm());
     return std::sqrt(nearest);
   };
 
-  for (const int v : region.driven) region.mark[v] = Part::asleep;
-  std::vector<int>& before = room.fallen;  // becomes those of them that are not free again
-  before.swap(region.free);
-  // Constraints are listed here too until they are sorted out.
-  std::vector<int>& batches = region.active.tetrahedra;
-  batches.clear();
-  region.driven.clear();
-  region.free.clear();
-  for (const std::vector<Vector3>& of_piece : centres) {
-    if (of_piece.empty()) continue;
-    Box box;
-    for (const Vector3& centre : of_piece) box.add(centre);
+  for_each_box(region.centres, model.radius, [&](const Box& box) {
     model.batches.for_each_near(box.grown(model.radius), [&](int batch) {
       if (room.batch_stamp[batch] == room.stamp) return;
       room.batch_stamp[batch] = room.stamp;
@@ -120,33 +126,30 @@ void recentre(const RegionModel& model, const RestShape& shape, const std::vecto
         }
         awake = awake || room.distance[*v] < model.radius;
       }
-      if (awake) batches.push_back(batch);
+      if (awake) room.batches.push_back(batch);
     });
-  }
-  for (const int batch : batches) {
+  });
+  for (const int batch : room.batches) {
     for (const int* v = model.vertices.begin(batch); v != model.vertices.end(batch); ++v) {
       if (room.vertex_stamp[*v] == 0) continue;
       room.vertex_stamp[*v] = 0;  // listed
-      (room.distance[*v] < model.radius ? region.free : region.driven).push_back(*v);
+      if (room.distance[*v] < model.radius) {
+        region.free.push_back(*v);
+      } else if (model.wall) {
+        region.driven.push_back(*v);
+      }
     }
   }
-  if (shape.packed.batches.empty()) {
-    sort_out(shape.constraints, batches, region.active.constraints);
+  if (model.wall) {
+    sort_out(shape.constraints, room.batches, region.active.constraints);
     region.active.others_rest = true;
-    batches.clear();
   }
 
   // What was free and is not any more falls asleep; what is free and was not wakes.
-  region.band.clear();
   for (const int v : before) region.mark[v] = Part::driven;
   for (const int v : region.free) {
     if (region.mark[v] == Part::asleep) room.woken.push_back(v);
     region.mark[v] = Part::free;
-    const double reach = 1.0 - (model.radius - room.distance[v]) / model.band;
-    if (!(reach > 0.0)) continue;
-    region.band.emplace_back();
-    region.band.back().vertex = v;
-    region.band.back().reach = reach;
   }
   std::size_t fallen = 0;
   for (const int v : before) {

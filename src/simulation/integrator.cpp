@@ -283,13 +283,6 @@ void element_forces(const RestShape& rest, const Moving& moving, std::vector<Vec
 void element_forces(const RestShape& rest, const Moving& moving, const ActiveElements& active,
                     std::vector<Vector3>& forces, ElementRoom& room) {
   const SomeVertices vertices = {active.vertices};
-  if (!rest.packed.batches.empty()) {
-    read_for_tetrahedra(rest, moving, vertices, room);
-    add_neo_hookean_forces(rest.packed, active.tetrahedra, room.displacements.front().data(),
-                           room.forces.front().data());
-    write_of_tetrahedra(vertices, room, forces);
-    return;
-  }
   read_for_constraints(rest, moving, vertices, room);
   add_constraint_forces(rest.constraints, active.constraints, room.motions.data(), room.pulls.data(),
                         room.shares.data());

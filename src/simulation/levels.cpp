@@ -11,7 +11,8 @@ namespace {
 /// s. What no instrument touches any more stays awake for this long.
 constexpr double awake_after_contact = 0.3;
 
-/// Of an edge: contact points closer than this to a centre need none of their own.
+/// Of an edge: contact points closer than this to a centre need none of their own, and a region stays as it is while
+/// every contact point has such a centre and every centre a contact point within twice as much.
 constexpr double centre_spacing = 0.5;
 
 /// Of the radius of a wall's region: the same there. A region is recentred by as much.
@@ -26,6 +27,9 @@ constexpr double settling_time = 0.01;
 
 /// Centres of a wall that are made room for from the start.
 constexpr std::size_t usual_centres = 64;
+
+/// Of mu times the edge: a band's spring.
+constexpr double band_stiffness = 3.0;
 
 /// Of the way: what a pin that has strayed comes back in one substep.
 constexpr double pin_return = 0.2;
@@ -74,54 +78,91 @@ Moved by_coarser(const OrganModel& model, std::size_t level, int v, const OrganS
 Moved moved(const OrganModel& model, std::size_t level, int v, const OrganState& state) {
   if (level == 0) return by_coarser(model, level, v, state);
   const LevelState& of_level = state.levels[level - 1];
-  if (of_level.region.mark[v] == Part::asleep) return by_coarser(model, level, v, state);
+  if (of_level.region.mark[v] != Part::free) return by_coarser(model, level, v, state);
   const Vector3& velocity = of_level.velocities[v];
   return {of_level.positions[v] - of_level.ahead * velocity - shape_of(model, level).positions[v], velocity};
 }
 
-/// The driven vertices go where the coarser level has them, and the band's targets with them.
-void follow(const OrganModel& model, std::size_t level, OrganState& state) {
-  const LevelView at = view(model, level, state);
-  for (const int v : at.region.driven) {
-    const Moved to = by_coarser(model, level, v, state);
-    at.positions[v] = at.shape.positions[v] + to.displacement;
-    at.velocities[v] = to.velocity;
+double edge_of(const OrganModel& model, std::size_t level) {
+  return level == 0 ? model.fine_edge : model.levels[level - 1].edge;
+}
+
+bool any_within(const std::vector<Vector3>& places, const Vector3& of, double distance) {
+  return std::any_of(places.begin(), places.end(),
+                     [&](const Vector3& place) { return (place - of).squaredNorm() < distance * distance; });
+}
+
+/// Makes the centres of a region anew around `touched`, a list a piece, unless they still are around it.
+bool move_centres(const std::vector<std::vector<Vector3>>& touched, double spacing, std::vector<Vector3>& centres) {
+  bool still = true;
+  for (const std::vector<Vector3>& of_piece : touched) {
+    for (const Vector3& place : of_piece) still = still && any_within(centres, place, spacing);
   }
-  for (BandVertex& band : at.region.band) {
-    const Moved to = by_coarser(model, level, band.vertex, state);
-    band.target = at.shape.positions[band.vertex] + to.displacement;
-    band.velocity = to.velocity;
+  for (const Vector3& centre : centres) {
+    bool near = false;
+    for (const std::vector<Vector3>& of_piece : touched) near = near || any_within(of_piece, centre, 2.0 * spacing);
+    still = still && near;
   }
+  if (still) return false;
+  centres.clear();
+  for (const std::vector<Vector3>& of_piece : touched) {
+    for (const Vector3& place : of_piece) {
+      if (!any_within(centres, place, spacing)) centres.push_back(place);
+    }
+  }
+  return true;
 }
 
-/// The same for the time dt (s) in which the coarser level moves on in a line.
-void follow_on(double dt, const LevelView& at) {
-  for (const int v : at.region.driven) at.positions[v] += dt * at.velocities[v];
-  for (BandVertex& band : at.region.band) band.target += dt * band.velocity;
+const Embedding& pins_of(const OrganModel& model, std::size_t level) {
+  static const Embedding none;  // attached vertices of the organ itself do not move
+  return level == 0 ? none : model.levels[level - 1].pins;
 }
 
-/// N/m of a band's spring: 0 where the band begins, and what fixes the vertex at the radius. No stiffer than a substep
-/// of dt (s) is stable for.
-double band_stiffness(double reach, double mass, double modulus_times_edge, double dt) {
-  return std::min(3.0 * modulus_times_edge * reach * reach / (1.01 - std::min(reach, 1.0)), 0.25 * mass / (dt * dt));
-}
-
-void wake_level(const OrganModel& model, std::size_t level, OrganState& state, RegionRoom& room, double& farthest) {
+/// Whether the region is another one now.
+bool wake_level(const OrganModel& model, std::size_t level, OrganState& state, LevelsRoom& room, double& farthest) {
   const LevelView at = view(model, level, state);
-  recentre(model.regions[level], at.shape, state.centres, at.region, room);
-  for (const int v : room.fallen) {
+  AwakeSolid& awake = room.awake[level];
+  const double edge = edge_of(model, level);
+  if (!move_centres(state.centres, centre_spacing * edge, at.region.centres) && awake.made_from == at.region.centres) {
+    return false;
+  }
+  RegionRoom& changed = room.regions[level];
+  recentre(model.regions[level], at.shape, at.region, changed);
+  for (const int v : changed.fallen) {
     const Moved to = by_coarser(model, level, v, state);
     const Vector3 place = at.shape.positions[v] + to.displacement;
     farthest = std::max(farthest, (place - at.positions[v]).norm());
     at.positions[v] = place;
     at.velocities[v].setZero();
   }
-  for (const int v : room.woken) {
+  for (const int v : changed.woken) {
     const Moved to = by_coarser(model, level, v, state);
     at.positions[v] = at.shape.positions[v] + to.displacement;
     at.velocities[v] = to.velocity;
   }
-  follow(model, level, state);
+  gather(model.regions[level], at.shape, pins_of(model, level), at.region, changed,
+         band_stiffness * model.shear_modulus * edge, awake);
+  return true;
+}
+
+/// m; any displacement will do that moves with the organ.
+Vector3 common_displacement(const OrganModel& model, const OrganState& state) {
+  return state.levels.back().positions.front() - model.levels.back().shape.positions.front();
+}
+
+/// Everything that follows a coarser level goes where that is now.
+void follow_all(const OrganModel& model, OrganState& state, LevelsRoom& room) {
+  room.common = common_displacement(model, state);
+  for (AwakeSolid& awake : room.awake) carry_nothing(awake);
+  for (std::size_t level = 0; level < model.levels.size(); ++level) {
+    carry_finer(model.levels[level].finer, shape_of(model, level).attached, room.awake[level], room.awake[level + 1]);
+  }
+  for (std::size_t level = model.levels.size() + 1; level-- > 0;) {
+    const LevelView at = view(model, level, state);
+    const double ahead = level == 0 ? 0.0 : state.levels[level - 1].ahead;
+    read_motion(at.shape, at.positions, at.velocities, ahead, room.common, room.awake[level]);
+    if (level < model.levels.size()) follow(room.awake[level + 1], room.common, room.awake[level]);
+  }
 }
 
 /// Whether what only centre `c` keeps awake is at rest.
@@ -175,7 +216,8 @@ double wake_wall(const OrganModel& model, const std::vector<ContactPoint>& point
     break;
   }
   if (!changed) return 0.0;
-  recentre(model.regions.front(), model.rest, state.centres, state.region, room);
+  state.region.centres = centres;
+  recentre(model.regions.front(), model.rest, state.region, room);
   double farthest = 0.0;
   for (const int v : room.fallen) {
     farthest = std::max(farthest, (model.rest.positions[v] - state.positions[v]).norm());
@@ -185,55 +227,53 @@ double wake_wall(const OrganModel& model, const std::vector<ContactPoint>& point
   return farthest;
 }
 
-double edge_of(const OrganModel& model, std::size_t level) {
-  return level == 0 ? model.fine_edge : model.levels[level - 1].edge;
-}
-
 /// Gives the nodes around every pin the velocities at which it stays, or comes back, to its rest place.
-void hold_pins(const Level& level, double dt, const LevelView& at) {
-  for (std::size_t p = 0; p < level.pins.corners.size(); ++p) {
-    const Tetrahedron& corners = level.pins.corners[p];
-    const std::array<double, 4>& weights = level.pins.weights[p];
-    // A pin of which a corner is asleep lies outside the region: the coarser level holds it.
-    const auto asleep = [&](int v) { return at.region.mark[v] == Part::asleep; };
-    if (std::any_of(corners.begin(), corners.end(), asleep)) continue;
-    Vector3 velocity = Vector3::Zero();
-    double ease = 0.0;
+void hold_pins(const RestShape& shape, double dt, const Vector3& common, const AwakeSolid& awake,
+               std::vector<Vector3>& velocities) {
+  for (const Pin& pin : awake.pins) {
+    Vector3 velocity = pin_return / dt * common;
     for (std::size_t i = 0; i < 4; ++i) {
-      const int v = corners[i];
-      velocity += weights[i] * (at.velocities[v] + pin_return / dt * (at.positions[v] - at.shape.positions[v]));
-      ease += weights[i] * weights[i] * at.shape.inverse_mass[v];
+      const auto corner = static_cast<std::size_t>(pin.corners[i]);
+      const Vector3 moves = corner < awake.free ? velocities[awake.vertices[corner]]
+                                                : Vector3(awake.velocities[corner].head<3>().cast<double>());
+      const Vector3 displacement = awake.displacements[corner].head<3>().cast<double>();
+      velocity += pin.weights[i] * (moves + pin_return / dt * displacement);
     }
     for (std::size_t i = 0; i < 4; ++i) {
-      if (at.region.mark[corners[i]] != Part::free) continue;  // driven: where the coarser level has it
-      at.velocities[corners[i]] -= weights[i] * at.shape.inverse_mass[corners[i]] / ease * velocity;
+      if (static_cast<std::size_t>(pin.corners[i]) >= awake.free) continue;  // where the coarser level has it
+      const int v = awake.vertices[pin.corners[i]];
+      velocities[v] -= pin.weights[i] * shape.inverse_mass[v] / pin.ease * velocity;
     }
   }
 }
 
-/// One explicit substep of a coarser level: elements, what the contacts pushed, band. Returns the largest speed, m/s.
+/// One explicit substep of a coarser level: elements, band, what the contacts pushed. Returns the largest speed, m/s.
 double move_level(const OrganModel& model, std::size_t level, const Vector3& gravity, double dt, OrganState& state,
-                  ElementRoom& room) {
+                  LevelsRoom& room) {
   const LevelView at = view(model, level, state);
   LevelState& own = state.levels[level - 1];
-  element_forces(at.shape, {at.positions, at.velocities}, at.region.active, own.forces, room);
+  AwakeSolid& awake = room.awake[level];
+  read_motion(at.shape, at.positions, at.velocities, 0.0, room.common, awake);
+  solid_forces(at.shape, dt, awake);
   const double slowed = 1.0 / (1.0 + dt * model.drag);
-  double fastest = 0.0;
-  const double stiffness = model.shear_modulus * edge_of(model, level);
-  for (const BandVertex& band : at.region.band) {
-    const double k = band_stiffness(band.reach, at.shape.mass[band.vertex], stiffness, dt);
-    own.push[band.vertex] += dt * k * (band.target - at.positions[band.vertex]);
-  }
-  for (const int v : at.region.free) {
+  for (std::size_t i = 0; i < awake.free; ++i) {
+    const int v = awake.vertices[i];
+    const Vector3 force = awake.forces[i].head<3>().cast<double>();
     at.velocities[v] =
-        slowed * (at.velocities[v] + at.shape.inverse_mass[v] * (dt * own.forces[v] + own.push[v]) + dt * gravity);
+        slowed * (at.velocities[v] + at.shape.inverse_mass[v] * (dt * force + own.push[v]) + dt * gravity);
     own.push[v].setZero();
   }
-  hold_pins(model.levels[level - 1], dt, at);
-  for (const int v : at.region.free) {
+  hold_pins(at.shape, dt, room.common, awake, at.velocities);
+  double fastest = 0.0;
+  for (std::size_t i = 0; i < awake.free; ++i) {
+    const int v = awake.vertices[i];
     at.positions[v] += dt * at.velocities[v];
+    awake.velocities[i].head<3>() = at.velocities[v].cast<float>();
     fastest = std::max(fastest, at.velocities[v].squaredNorm());
   }
+  own.ahead = dt;
+  follow(awake, room.common, room.awake[level - 1]);
+  follow_on(dt, awake);
   return std::sqrt(fastest);
 }
 
@@ -250,14 +290,19 @@ int divisor(int number, int least) {
 }  // namespace
 
 void prepare(LevelsRoom& room, const OrganModel& model) {
-  room.elements.resize(model.levels.size());
   room.regions.resize(model.regions.size());
-  for (std::size_t level = 0; level < model.levels.size(); ++level) {
-    prepare(room.elements[level], model.levels[level].shape);
-  }
   for (std::size_t level = 0; level < model.regions.size(); ++level) {
     prepare(room.regions[level], shape_of(model, level));
   }
+  if (model.levels.empty()) return;
+  room.awake.resize(model.levels.size() + 1);
+  room.handed.resize(model.levels.size() + 1);
+  for (std::size_t level = 0; level <= model.levels.size(); ++level) {
+    prepare(room.awake[level], shape_of(model, level));
+    room.handed[level].impulses.assign(shape_of(model, level).positions.size(), Vector3::Zero());
+    room.handed[level].vertices.reserve(usual_contacts);
+  }
+  gather_all(model.levels.back().shape, model.levels.back().pins, room.awake.back());
 }
 
 void rest_levels(const OrganModel& model, std::size_t pieces, OrganState& state) {
@@ -275,7 +320,6 @@ void rest_levels(const OrganModel& model, std::size_t pieces, OrganState& state)
     at.positions = level.shape.positions;
     at.velocities.assign(at.positions.size(), Vector3::Zero());
     at.push = at.velocities;
-    at.forces = at.velocities;
     at.region.mark.assign(at.positions.size(), Part::asleep);
   }
   // The coarsest is always awake.
@@ -283,9 +327,6 @@ void rest_levels(const OrganModel& model, std::size_t pieces, OrganState& state)
   std::fill(coarsest.mark.begin(), coarsest.mark.end(), Part::free);
   for (std::size_t v = 0; v < coarsest.mark.size(); ++v) coarsest.free.push_back(static_cast<int>(v));
   coarsest.active.vertices = coarsest.free;
-  for (std::size_t b = 0; b < model.levels.back().shape.packed.batches.size(); ++b) {
-    coarsest.active.tetrahedra.push_back(static_cast<int>(b));
-  }
 }
 
 double wake(const OrganModel& model, const std::vector<ContactPoint>& points, OrganState& state, LevelsRoom& room) {
@@ -307,9 +348,11 @@ double wake(const OrganModel& model, const std::vector<ContactPoint>& points, Or
     if (!seen[p] && state.untouched[p] > awake_after_contact) state.centres[p].clear();
   }
   double farthest = 0.0;
+  bool changed = false;
   for (std::size_t level = model.levels.size(); level-- > 0;) {
-    wake_level(model, level, state, room.regions[level], farthest);
+    changed = wake_level(model, level, state, room, farthest) || changed;
   }
+  if (changed) follow_all(model, state, room);
   return farthest;
 }
 
@@ -339,48 +382,52 @@ void share_substeps(const OrganModel& model, double duration, OrganState& state,
 
 double move_coarser(const OrganModel& model, const Vector3& gravity, int substep, int substeps, double dt,
                     OrganState& state, LevelsRoom& room) {
+  // All levels begin a substep with the first: what is measured from here is measured anew.
+  if (substep == 1) room.common = common_displacement(model, state);
   double fastest = 0.0;
   for (std::size_t level = model.levels.size(); level > 0; --level) {
     LevelState& at = state.levels[level - 1];
     const int every = substeps / at.substeps;
     const bool begins = (substep - 1) % every == 0;
-    if (begins) at.speed = move_level(model, level, gravity, every * dt, state, room.elements[level - 1]);
+    if (begins) at.speed = move_level(model, level, gravity, every * dt, state, room);
     fastest = std::max(fastest, at.speed);
-    if (!begins) continue;
-    if (level < model.levels.size()) follow_on(every * dt, view(model, level, state));
-    at.ahead = every * dt;
-    follow(model, level - 1, state);  // from where it is now: what has been followed so far ends here
   }
   for (std::size_t p = 0; p < state.untouched.size(); ++p) state.untouched[p] += dt;
   return fastest;
 }
 
-void add_band_forces(const OrganModel& model, double dt, OrganState& state) {
-  const double stiffness = model.shear_modulus * model.fine_edge;
-  for (const BandVertex& band : state.region.band) {
-    const double k = band_stiffness(band.reach, model.rest.mass[band.vertex], stiffness, dt);
-    state.forces[band.vertex] += k * (band.target - state.positions[band.vertex]);
+void solid_forces(const OrganModel& model, double dt, OrganState& state, LevelsRoom& room) {
+  AwakeSolid& awake = room.awake.front();
+  read_motion(model.rest, state.positions, state.velocities, 0.0, room.common, awake);
+  solid_forces(model.rest, dt, awake);
+  for (std::size_t i = 0; i < awake.free; ++i) {
+    state.forces[awake.vertices[i]] = awake.forces[i].head<3>().cast<double>();
   }
 }
 
-void follow_coarser(const OrganModel& model, double dt, OrganState& state) {
+void follow_coarser(double dt, OrganState& state, LevelsRoom& room) {
   for (LevelState& level : state.levels) level.ahead = std::max(0.0, level.ahead - dt);
-  follow_on(dt, view(model, 0, state));
+  follow_on(dt, room.awake.front());
 }
 
-void press_coarser(const OrganModel& model, const std::vector<ContactPoint>& points, OrganState& state) {
-  const auto press = [&](std::size_t level, int v, const Vector3& impulse, auto&& self) -> void {
-    if (level > 0) state.levels[level - 1].push[v] += impulse;
-    if (level == model.levels.size()) return;
-    const Embedding& bearing = model.levels[level].bearing;
-    for (std::size_t i = 0; i < 4; ++i) {
-      self(level + 1, bearing.corners[v][i], bearing.weights[v][i] * impulse, self);
-    }
-  };
+void press_coarser(const OrganModel& model, const std::vector<ContactPoint>& points, OrganState& state,
+                   LevelsRoom& room) {
   for (const ContactPoint& point : points) {
     for (int i = 0; i < point.bearers.count; ++i) {
-      press(0, point.bearers.vertices[i], point.bearers.weights[i] * point.impulse * point.direction, press);
+      const Vector3 impulse = point.bearers.weights[i] * point.impulse * point.direction;
+      room.handed.front().add(point.bearers.vertices[i], impulse);
     }
+  }
+  for (std::size_t level = 0; level < model.levels.size(); ++level) {
+    const Embedding& bearing = model.levels[level].bearing;
+    std::vector<Vector3>& push = state.levels[level].push;
+    room.handed[level].take_all([&](int v, const Vector3& impulse) {
+      for (std::size_t i = 0; i < 4; ++i) {
+        const Vector3 share = bearing.weights[v][i] * impulse;
+        push[bearing.corners[v][i]] += share;
+        if (level + 1 < model.levels.size()) room.handed[level + 1].add(bearing.corners[v][i], share);
+      }
+    });
   }
 }
 
@@ -392,7 +439,7 @@ void place(const OrganModel& model, const int* first, const int* last, OrganStat
   for (const int* v = first; v != last; ++v) {
     if (*v < model.rest.first_simulated) {
       carry(model.rest, *v, state.positions);
-    } else if (!model.levels.empty() && state.region.mark[*v] == Part::asleep) {
+    } else if (!model.levels.empty() && state.region.mark[*v] != Part::free) {
       state.positions[*v] = model.rest.positions[*v] + by_coarser(model, 0, *v, state).displacement;
     }
   }

@@ -157,15 +157,14 @@ double integrate_elements(StepContext& context) {
   } else {
     coarser_speed =
         move_coarser(model, context.world.gravity, context.substep, context.substeps, context.dt, state, work.levels);
-    element_forces(model.rest, state, state.region.active, state.forces, work.elements);
-    add_band_forces(model, context.dt, state);
+    solid_forces(model, context.dt, state, work.levels);
   }
   accelerate(model, context.world.gravity, context.dt, state.forces, state);
   stop_at_instrument(work.points, model.rest.inverse_mass, state.positions, context.dt, state.velocities);
   const double speed = std::max(coarser_speed, advance(model, context.dt, state));
   if (!model.levels.empty()) {
-    press_coarser(model, work.points, state);
-    follow_coarser(model, context.dt, state);
+    press_coarser(model, work.points, state, work.levels);
+    follow_coarser(context.dt, state, work.levels);
   }
   if (context.substep == context.substeps) {  // the next step asks for it
     state.stiffening = stiffening(model.rest, model.tetrahedra_at, work.points, state.positions);

@@ -89,10 +89,10 @@ namespace {
 
 void copy_region(const ActiveRegion& from, ActiveRegion& to) {
   for (const int v : to.active.vertices) to.mark[v] = Part::asleep;
+  to.centres = from.centres;
   to.active = from.active;
   to.free = from.free;
   to.driven = from.driven;
-  to.band = from.band;
   for (const int v : to.free) to.mark[v] = Part::free;
   for (const int v : to.driven) to.mark[v] = Part::driven;
 }

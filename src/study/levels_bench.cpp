@@ -160,9 +160,9 @@ double displacement_error(const RestShape& rest, const std::vector<Vector3>& our
   return std::sqrt(difference / whole);
 }
 
-/// Batches of the organ's own tetrahedra that are awake, in tetrahedra.
-int awake_tetrahedra(const OrganState& organ) {
-  return static_cast<int>(organ.region.active.tetrahedra.size()) * NeoHookeanBatch::lanes;
+/// Of the organ's own tetrahedra.
+int awake_tetrahedra(const Workspace& workspace) {
+  return static_cast<int>(workspace.organs.front().levels.awake.front().packed.tetrahedra);
 }
 
 void print_levels(const OrganModel& model) {
@@ -222,7 +222,7 @@ bool bench_levels(BenchWords words, JsonRows& json) {
   int active = 0;
   for (int i = 1; i <= steps_of_slide; ++i) {
     both_go(given.at(static_cast<double>(i) / steps_of_slide, depth));
-    active = std::max(active, awake_tetrahedra(levels.state.organs.front()));
+    active = std::max(active, awake_tetrahedra(levels.workspace));
   }
   double mean = 0.0;
   double worst = 0.0;

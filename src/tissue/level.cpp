@@ -26,6 +26,9 @@ constexpr std::size_t finest_part = 4;
 /// What a tetrahedron of the lattice counts at least. With nothing in it the vertices on its far side would be free.
 constexpr double least_fill = 0.02;
 
+/// Edges of the lattice: places on a held surface are no farther apart.
+constexpr double pin_spacing = 0.5;
+
 double half_ball(double radius) {
   return 2.0 / 3.0 * 3.14159265358979 * radius * radius * radius;
 }
@@ -36,16 +39,42 @@ double volume_of(const RestShape& shape) {
   return volume;
 }
 
-/// The attached vertices of the organ in one tetrahedron hold it at their middle. Its nodes may stand a good way off
-/// the tissue: held themselves, they would make a thin organ thicker and far softer.
-void add_pins(const RestShape& organ, const Lattice& lattice, Level& level) {
+/// Where the organ is held: at its attached vertices, and all over the triangles between them. In an organ meshed more
+/// coarsely there than the lattice, vertices alone would hold the lattice at a few points only.
+struct HeldPlaces {
   std::vector<Vector3> places;
-  std::vector<double> masses;
+  std::vector<double> masses;  ///< kg, how much each counts among those in one tetrahedron
+};
+
+HeldPlaces held_places(const RestShape& organ, double spacing) {
+  HeldPlaces held;
   for (std::size_t v = 0; v < organ.positions.size(); ++v) {
     if (!organ.attached[v]) continue;
-    places.push_back(organ.positions[v]);
-    masses.push_back(organ.mass[v]);
+    held.places.push_back(organ.positions[v]);
+    held.masses.push_back(organ.mass[v]);
   }
+  for (const auto& [a, b, c] : organ.triangles) {
+    if (!organ.attached[a] || !organ.attached[b] || !organ.attached[c]) continue;
+    const std::array<Vector3, 3> x = {organ.positions[a], organ.positions[b], organ.positions[c]};
+    const double longest = std::sqrt(
+        std::max({(x[1] - x[0]).squaredNorm(), (x[2] - x[1]).squaredNorm(), (x[0] - x[2]).squaredNorm()}));
+    const int parts = static_cast<int>(std::ceil(longest / spacing));
+    const double mass = (organ.mass[a] + organ.mass[b] + organ.mass[c]) / 3.0;
+    for (int i = 0; i <= parts; ++i) {
+      for (int j = 0; i + j <= parts; ++j) {
+        if (i == parts || j == parts || i + j == 0) continue;  // a corner
+        held.places.push_back(x[0] + (i * (x[1] - x[0]) + j * (x[2] - x[0])) / parts);
+        held.masses.push_back(mass);
+      }
+    }
+  }
+  return held;
+}
+
+/// What is held in one tetrahedron holds it at its middle. Its nodes may stand a good way off the tissue: held
+/// themselves, they would make a thin organ thicker and far softer.
+void add_pins(const HeldPlaces& at, const Lattice& lattice, Level& level) {
+  const auto& [places, masses] = at;
   const Embedding embedding = embed(places, lattice);
   const std::vector<Tetrahedron>& corners = embedding.corners;
   std::vector<int> held(places.size());
@@ -70,7 +99,10 @@ void add_pins(const RestShape& organ, const Lattice& lattice, Level& level) {
 }
 
 Level build_level(const Organ& organ, const RestShape& finest, const RestShape& finer, double edge) {
-  const Lattice lattice = cover(organ.solid, finer.positions, edge);
+  const HeldPlaces held = held_places(finest, pin_spacing * edge);
+  std::vector<Vector3> covered = finer.positions;
+  covered.insert(covered.end(), held.places.begin(), held.places.end());
+  const Lattice lattice = cover(organ.solid, covered, edge);
   Level level;
   level.edge = edge;
   level.finer = embed(finer.positions, lattice);
@@ -93,7 +125,7 @@ Level build_level(const Organ& organ, const RestShape& finest, const RestShape& 
     shape.tetrahedra.push_back(NeoHookeanElement::at_rest(corners, x, {fill * moduli.mu, fill * moduli.lambda}));
   }
   shape.attached.assign(shape.positions.size(), 0);  // pins hold it
-  add_pins(finest, lattice, level);
+  add_pins(held, lattice, level);
   for (std::size_t v = 0; v < level.bearing.weights.size(); ++v) {
     std::array<double, 4>& weights = level.bearing.weights[v];
     double sum = 0.0;

@@ -113,10 +113,11 @@ TEST(WallRegion, HoldsWhatIsWithinTheRadius) {
   ActiveRegion region;
   region.mark.assign(rest.positions.size(), Part::asleep);
   for (const double x : {0.0, 0.004, -0.05}) {
-    const std::vector<std::vector<Vector3>> centres = {{Vector3(x, 0.0, tube_radius), Vector3(x, 0.01, 0.01)}};
-    recentre(model.regions[0], rest, centres, region, room);
+    const std::vector<Vector3> centres = {Vector3(x, 0.0, tube_radius), Vector3(x, 0.01, 0.01)};
+    region.centres = centres;
+    recentre(model.regions[0], rest, region, room);
     const auto near = [&](int v) {
-      return std::min((rest.positions[v] - centres[0][0]).norm(), (rest.positions[v] - centres[0][1]).norm()) <
+      return std::min((rest.positions[v] - centres[0]).norm(), (rest.positions[v] - centres[1]).norm()) <
              model.regions[0].radius;
     };
     std::set<int> free;
@@ -143,7 +144,6 @@ TEST(WallRegion, HoldsWhatIsWithinTheRadius) {
     expect_batches(rest.constraints.flaps, own, chosen.flaps);
     expect_batches(rest.constraints.triangles, own, chosen.triangles);
     expect_batches(rest.constraints.distances, own, chosen.distances);
-    EXPECT_TRUE(region.active.tetrahedra.empty());
     EXPECT_EQ(std::set<int>(region.free.begin(), region.free.end()), free);
     EXPECT_EQ(std::set<int>(region.driven.begin(), region.driven.end()), driven);
     for (std::size_t v = 0; v < region.mark.size(); ++v) {

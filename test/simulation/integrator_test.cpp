@@ -120,10 +120,11 @@ std::vector<int> flat(const Rows& rows, int divisor) {
   return all;
 }
 
-TEST(ElementForces, OfAPartAreTheSameBitsWhereAllElementsAreInIt) {
+TEST(ElementForces, OfAPartOfAWallAreTheSameBitsWhereAllElementsAreInIt) {
   for (const Organ& organ : organs()) {
     Moved moved(organ);
     const RestShape& rest = moved.rest();
+    if (!rest.tetrahedra.empty()) continue;
     const std::vector<Vector3> whole = moved.forces();
     const std::set<int> chosen = {20, 21, 33};
     std::set<int> vertices;
@@ -134,8 +135,6 @@ TEST(ElementForces, OfAPartAreTheSameBitsWhereAllElementsAreInIt) {
     active.constraints.flaps = batches_at(rest.constraints.flaps, of_batch, chosen, vertices);
     active.constraints.triangles = batches_at(rest.constraints.triangles, of_batch, chosen, vertices);
     active.constraints.distances = batches_at(rest.constraints.distances, of_batch, chosen, vertices);
-    active.tetrahedra = batches_at(
-        rest.packed.batches, [](const NeoHookeanBatch& b) { return flat(b.vertices, 1); }, chosen, vertices);
     active.vertices.assign(vertices.begin(), vertices.end());
     ASSERT_LT(active.vertices.size(), whole.size());
 

@@ -50,7 +50,7 @@ struct Moving {
 void element_forces(const RestShape& rest, const Moving& moving, std::vector<Vector3>& forces, ElementRoom& room,
                     Threads* threads = nullptr);
 
-/// The same for a part of an organ whose elements are not cut into chunks: writes the forces of its elements on its
+/// The same for a part of a wall whose elements are not cut into chunks: writes the forces of its elements on its
 /// vertices, and leaves those on others. What the rest of the surface adds to the enclosed volume is what it added when
 /// it was last computed, or nothing if it is at rest.
 void element_forces(const RestShape& rest, const Moving& moving, const ActiveElements& active,

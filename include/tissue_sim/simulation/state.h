@@ -24,7 +24,6 @@ struct PlaceForce {
 struct LevelState {
   std::vector<Vector3> positions;   ///< m
   std::vector<Vector3> velocities;  ///< m/s
-  std::vector<Vector3> forces;      ///< N, of the elements in the last substep
   std::vector<Vector3> push;        ///< N s, of the contacts since the level's last substep
   ActiveRegion region;
   int substeps = 1;    ///< in this step
