@@ -83,8 +83,7 @@ void gather_pins(const RestShape& shape, const Embedding& pins, AwakeSolid& awak
 }
 
 void make_room_for_motion(AwakeSolid& awake) {
-  for (std::vector<Eigen::Vector4f>* floats :
-       {&awake.displacements, &awake.velocities, &awake.damped, &awake.forces}) {
+  for (std::vector<Eigen::Vector4f>* floats : {&awake.displacements, &awake.velocities, &awake.damped, &awake.forces}) {
     make_room(awake.vertices.size(), *floats);
     floats->resize(awake.vertices.size(), Eigen::Vector4f::Zero());
   }

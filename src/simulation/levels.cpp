@@ -13,7 +13,7 @@ constexpr double awake_after_contact = 0.3;
 
 /// Of an edge: contact points closer than this to a centre need none of their own, and a region stays as it is while
 /// every contact point has such a centre and every centre a contact point within twice as much.
-constexpr double centre_spacing = 0.5;
+constexpr double centre_spacing = 0.7;
 
 /// Of the radius of a wall's region: the same there. A region is recentred by as much.
 constexpr double wall_centre_spacing = 0.125;

@@ -33,9 +33,9 @@ constexpr Command commands[] = {
      "the\n"
      "                               elements of a substep against one by one and against what the machine can do\n"},
     {"levels", bench_levels,
-     "  levels                       a solid under a probe with levels against everything awake: time, and error of "
+     "  levels [--solid FILE.msh]    a solid under a probe with levels against everything awake: time, and error of "
      "force\n"
-     "                               and displacement\n"},
+     "                               and displacement; of the bundled liver's tetrahedra cut finer, or of FILE\n"},
     {"load", bench_load,
      "  load                         an organ of 100,000 and one of 1,000,000 triangles, from file to first step\n"},
 };

@@ -52,8 +52,9 @@ struct Case {
   }
 };
 
-/// The bundled liver as a solid, held at its underside as in config/scenes/demo.yaml, under the bundled probe.
-Case liver_under_probe(const std::string& config) {
+/// The bundled liver as a solid, held at its underside as in config/scenes/demo.yaml, under the bundled probe. `mesh`:
+/// its tetrahedra, fine where it is pressed; empty: the bundled ones, cut there until they are.
+Case liver_under_probe(const std::string& config, const std::string& mesh) {
   std::vector<std::string> warnings;
   Case made;
   Organ liver;
@@ -67,12 +68,14 @@ Case liver_under_probe(const std::string& config) {
   const ClosestFeature last = closest_feature(surface, first.point + Vector3(slide, 0.0, 0.01));
   made.first = {first.point, first.direction};
   made.last = {last.point, last.direction};
-  refine(liver.solid, [&](const Vector3& p) {
+  if (!mesh.empty()) liver.solid = read_tetrahedral_mesh(mesh, 0.001, warnings);
+  const auto longest = [&](const Vector3& p) {
     const Vector3 along = last.point - first.point;
     const double part = std::clamp((p - first.point).dot(along) / along.squaredNorm(), 0.0, 1.0);
     const double away = (p - first.point - part * along).norm();
     return longest_edge * fine + grading * std::max(0.0, away - fine_within);
-  });
+  };
+  if (mesh.empty()) refine(liver.solid, longest);
   sort_vertices_for_locality(liver.solid);
   liver.mesh = take_surface(liver.solid);
   sort_for_locality(liver.solid);
@@ -179,11 +182,12 @@ void print_levels(const OrganModel& model) {
 }  // namespace
 
 bool bench_levels(BenchWords words, JsonRows& json) {
+  const std::string mesh = words.take_value("--solid");
   if (!words.words.empty()) return false;
   const std::string program = std::filesystem::read_symlink("/proc/self/exe").string();
   const std::string scene = resolve_path("package://tissue_sim/config/scenes/demo.yaml", program);
   const std::string config = std::filesystem::path(scene).parent_path().parent_path().string();
-  Case given = liver_under_probe(config);
+  Case given = liver_under_probe(config, mesh);
   Way awake(given.scene);
   given.scene.organs.front().levels_tolerance = tolerance;
   Way levels(given.scene);

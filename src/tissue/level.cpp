@@ -56,8 +56,8 @@ HeldPlaces held_places(const RestShape& organ, double spacing) {
   for (const auto& [a, b, c] : organ.triangles) {
     if (!organ.attached[a] || !organ.attached[b] || !organ.attached[c]) continue;
     const std::array<Vector3, 3> x = {organ.positions[a], organ.positions[b], organ.positions[c]};
-    const double longest = std::sqrt(
-        std::max({(x[1] - x[0]).squaredNorm(), (x[2] - x[1]).squaredNorm(), (x[0] - x[2]).squaredNorm()}));
+    const double longest =
+        std::sqrt(std::max({(x[1] - x[0]).squaredNorm(), (x[2] - x[1]).squaredNorm(), (x[0] - x[2]).squaredNorm()}));
     const int parts = static_cast<int>(std::ceil(longest / spacing));
     const double mass = (organ.mass[a] + organ.mass[b] + organ.mass[c]) / 3.0;
     for (int i = 0; i <= parts; ++i) {

@@ -46,8 +46,8 @@ struct RegionRoom {
   std::vector<std::uint64_t> batch_stamp;
   std::vector<double> distance;  ///< m, of those that were looked at last
   std::vector<int> batches;      ///< with a free vertex
-  std::vector<int> woken;   ///< vertices that were asleep before
-  std::vector<int> fallen;  ///< vertices that were free before and are not any more
+  std::vector<int> woken;        ///< vertices that were asleep before
+  std::vector<int> fallen;       ///< vertices that were free before and are not any more
   std::uint64_t stamp = 0;
 };
 void prepare(RegionRoom& room, const RestShape& shape);

@@ -33,15 +33,15 @@ struct Pin {
 /// it. Motion is kept in floats, so it is measured from a common displacement: that of an organ that has fallen far
 /// would leave no digits for its strain.
 struct AwakeSolid {
-  std::vector<Vector3> made_from;    ///< centres of the region
-  std::vector<int> vertices;         ///< of the level: the free ones, in their order; those that follow the coarser one
-  std::size_t free = 0;              ///< so many of them
-  std::size_t corners = 0;           ///< so many have tetrahedra; behind them what only carries the finer level
-  std::vector<int> place;            ///< of each vertex of the level among `vertices`, or -1
-  NeoHookeanSolid packed;            ///< tetrahedra with a free corner, by places in `vertices`
-  std::vector<Follower> followers;   ///< one for each of `vertices` that is not free
-  std::vector<BandVertex> band;      ///< the outermost of the free ones
-  std::vector<Pin> pins;             ///< all of whose corners are awake
+  std::vector<Vector3> made_from;   ///< centres of the region
+  std::vector<int> vertices;        ///< of the level: the free ones, in their order; those that follow the coarser one
+  std::size_t free = 0;             ///< so many of them
+  std::size_t corners = 0;          ///< so many have tetrahedra; behind them what only carries the finer level
+  std::vector<int> place;           ///< of each vertex of the level among `vertices`, or -1
+  NeoHookeanSolid packed;           ///< tetrahedra with a free corner, by places in `vertices`
+  std::vector<Follower> followers;  ///< one for each of `vertices` that is not free
+  std::vector<BandVertex> band;     ///< the outermost of the free ones
+  std::vector<Pin> pins;            ///< all of whose corners are awake
   std::vector<Eigen::Vector4f> displacements;  ///< m, one for each of `vertices`, less the common one
   std::vector<Eigen::Vector4f> velocities;     ///< m/s
   std::vector<Eigen::Vector4f> damped;         ///< m: where they will be after the damping time
