@@ -179,6 +179,7 @@ void clear(WideTree::Node& node) {
     node.upper[axis].fill(std::numeric_limits<float>::quiet_NaN());
   }
   node.child.fill(-1);
+  node.children = 0;
 }
 
 /// Boxes of the leaves near to all the edges. False: there are too many of them.
@@ -298,10 +299,19 @@ __attribute__((target("avx2"))) void find_pairs_wide(const WideTree& tree, const
 }
 #endif
 
-/// Squared distances from p to the children's boxes, or a little less; see closest().
+/// A float that is no smaller. Where only infinity is, no distance is too far, not even one that is too large for a float.
+TISSUE_SIM_INLINE float rounded_up(double value) {
+  constexpr double largest = std::numeric_limits<float>::max();
+  constexpr double smallest = std::numeric_limits<float>::min();
+  return value < (1.0 - 1e-6) * largest ? static_cast<float>(value * (1.0 + 1e-6) + smallest) : infinite;
+}
+
+/// Squared distances from p to the children's boxes, or a little less; see closest(). Returns a bit for each child that
+/// is no farther than `limit`.
 template <class Lane>
-TISSUE_SIM_INLINE void squared_distances(const WideTree::Node& node, const FloatPoint& p, float slack,
-                                         WideTree::Row& distances) {
+TISSUE_SIM_INLINE unsigned squared_distances(const WideTree::Node& node, const FloatPoint& p, float slack, float limit,
+                                             WideTree::Row& distances) {
+  unsigned near = 0;
   for (std::size_t l = 0; l < lanes; l += sizeof(Lane) / sizeof(float)) {
     Lane sum{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -311,16 +321,38 @@ TISSUE_SIM_INLINE void squared_distances(const WideTree::Node& node, const Float
       way = way > 0.0F ? way : Lane{};
       sum += way * way;
     }
-    *reinterpret_cast<Lane*>(distances.data() + l) = sum * (1.0F - 1e-6F);
+    sum *= 1.0F - 1e-6F;
+    *reinterpret_cast<Lane*>(distances.data() + l) = sum;
+    near |= bits_of(sum <= limit) << l;
   }
+  return near & ((1U << static_cast<unsigned>(node.children)) - 1U);
 }
 
-/// Nearest first. A coordinate is rounded by at most (its size) * rounding, a difference once more: `slack` is more
-/// than all of it.
-/// `near_enough(distance)` says by a squared distance whether what is no nearer has still to be looked at.
-template <class Lane, class NearEnough>
-TISSUE_SIM_INLINE void closest(const WideTree& tree, const Vector3& from, ClosestSearch& search,
-                               NearEnough&& near_enough) {
+/// Raises the distances of a leaf's triangles to those of their planes, and takes away the bits of what is then farther
+/// than `limit`: around a point on a curved surface the boxes of all neighbours have it, and their planes do not.
+template <class Lane>
+TISSUE_SIM_INLINE unsigned plane_distances(const WideTree::Leaf& leaf, const FloatPoint& p, float slack, float limit,
+                                           WideTree::Row& distances) {
+  unsigned near = 0;
+  for (std::size_t l = 0; l < lanes; l += sizeof(Lane) / sizeof(float)) {
+    const Lane height = lane<Lane>(leaf.normal[0], l) * p[0] + lane<Lane>(leaf.normal[1], l) * p[1] +
+                        lane<Lane>(leaf.normal[2], l) * p[2] - lane<Lane>(leaf.offset, l);
+    Lane way = (height > 0.0F ? height : -height) - slack;
+    way = way > 0.0F ? way : Lane{};
+    const Lane of_box = lane<Lane>(distances, l);
+    const Lane of_plane = way * way * (1.0F - 1e-6F);
+    const Lane farther = of_plane > of_box ? of_plane : of_box;
+    *reinterpret_cast<Lane*>(distances.data() + l) = farther;
+    near |= bits_of(farther <= limit) << l;
+  }
+  return near;
+}
+
+/// Nearest first. A coordinate is rounded by at most (its size) * rounding, a difference once more, and a height as
+/// straddled() says: `slack` and `slack_of_plane` are more than all of it.
+/// What is at a squared distance of more than `limit()` need not be looked at, as far as is known now.
+template <class Lane, class Limit>
+TISSUE_SIM_INLINE void closest(const WideTree& tree, const Vector3& from, ClosestSearch& search, Limit&& limit) {
   struct Entry {
     int child;
     float distance;
@@ -329,37 +361,40 @@ TISSUE_SIM_INLINE void closest(const WideTree& tree, const Vector3& from, Closes
   const FloatPoint p = to_float(from);
   const float size = tree.farthest + std::max({std::abs(p[0]), std::abs(p[1]), std::abs(p[2])});
   const float slack = 8.0F * rounding * size;
+  const float slack_of_plane = 32.0F * rounding * size;
+  float enough = rounded_up(limit());
   std::size_t waiting = 1;
   stack[0] = {0, 0.0F};
   while (waiting > 0) {
     const Entry entry = stack[--waiting];
-    if (!near_enough(entry.distance)) continue;
+    if (!(entry.distance <= enough)) continue;
     const WideTree::Node& node = tree.nodes[static_cast<std::size_t>(entry.child)];
     alignas(32) WideTree::Row distances;
-    squared_distances<Lane>(node, p, slack, distances);
+    unsigned near = squared_distances<Lane>(node, p, slack, enough, distances);
+    if (node.leaf >= 0) {
+      near &= plane_distances<Lane>(tree.leaves[static_cast<std::size_t>(node.leaf)], p, slack_of_plane, enough,
+                                    distances);
+    }
     const std::size_t bottom = waiting;
-    for (std::size_t l = 0; l < lanes && node.child[l] >= 0; ++l) {
-      if (!near_enough(distances[l])) continue;
+    for (; near != 0; near &= near - 1) {
+      const auto l = static_cast<std::size_t>(__builtin_ctz(near));
       std::size_t at = waiting++;
       for (; at > bottom && stack[at - 1].distance < distances[l]; --at) stack[at] = stack[at - 1];
       stack[at] = {node.child[l], distances[l]};
     }
     if (node.leaf < 0) continue;
     for (; waiting > bottom; --waiting) {
-      if (near_enough(stack[waiting - 1].distance)) search.look_at(stack[waiting - 1].child);
+      if (!(stack[waiting - 1].distance <= enough)) continue;
+      search.look_at(stack[waiting - 1].child);
+      enough = rounded_up(limit());
     }
   }
-}
-
-TISSUE_SIM_INLINE bool within(float squared_distance, double bound) {
-  return static_cast<double>(std::min(squared_distance, std::numeric_limits<float>::max())) <= bound;
 }
 
 template <class Lane>
 TISSUE_SIM_INLINE void closest(const WideTree& tree, const Vector3& from, ClosestSearch& search) {
   closest<Lane>(
-      tree, from,
-      search, [&](float distance) __attribute__((always_inline)) { return within(distance, search.bound); });
+      tree, from, search, [&]() __attribute__((always_inline)) { return search.bound; });
 }
 __attribute__((noinline)) void closest_narrow(const WideTree& tree, const Vector3& from, ClosestSearch& search) {
   closest<Four>(tree, from, search);
@@ -387,9 +422,7 @@ template <class Lane>
 TISSUE_SIM_INLINE void free_ball(const WideTree& tree, const Vector3& from, const Wanted& wanted,
                                  ClosestSearch& search) {
   closest<Lane>(
-      tree, from, search, [&](float distance) __attribute__((always_inline)) {
-        return within(distance, wanted.free_within(search.bound));
-      });
+      tree, from, search, [&]() __attribute__((always_inline)) { return wanted.free_within(search.bound); });
 }
 __attribute__((noinline)) void free_ball_narrow(const WideTree& tree, const Vector3& from, const Wanted& wanted,
                                                 ClosestSearch& search) {
@@ -486,7 +519,7 @@ struct Builder {
         }
       }
       const auto& [a, b, c] = triangles[triangle];
-      const Vector3 normal = area_normal(vertices[a], vertices[b], vertices[c]).stableNormalized();
+      const Vector3 normal = plane_normal(vertices[a], vertices[b], vertices[c]);
       const FloatPoint rounded = to_float(normal);
       for (std::size_t axis = 0; axis < 3; ++axis) leaf.normal[axis][l] = rounded[axis];
       leaf.offset[l] = static_cast<float>(normal.dot(vertices[a]));
@@ -498,6 +531,14 @@ struct Builder {
     return box;
   }
 
+  /// Zero also where rounding leaves so little of a sliver's plane that its corners are not on it.
+  static Vector3 plane_normal(const Vector3& a, const Vector3& b, const Vector3& c) {
+    const Vector3 normal = area_normal(a, b, c).stableNormalized();
+    const double size = std::max({a.lpNorm<Eigen::Infinity>(), b.lpNorm<Eigen::Infinity>(), c.lpNorm<Eigen::Infinity>()});
+    const double off = std::max(std::abs(normal.dot(b - a)), std::abs(normal.dot(c - a)));
+    return off <= static_cast<double>(rounding) * size ? normal : Vector3(Vector3::Zero());
+  }
+
   void set_lane(int index, std::size_t l, const Box& box, int child) {
     WideTree::Node& node = tree.nodes[static_cast<std::size_t>(index)];
     for (int axis = 0; axis < 3; ++axis) {
@@ -505,6 +546,7 @@ struct Builder {
       node.upper[static_cast<std::size_t>(axis)][l] = static_cast<float>(box.upper[axis]);
     }
     node.child[l] = child;
+    node.children = std::max(node.children, static_cast<int>(l) + 1);
   }
 };
 

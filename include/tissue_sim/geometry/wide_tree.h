@@ -34,13 +34,14 @@ struct WideTree {
     std::array<Row, 3> lower;
     std::array<Row, 3> upper;
     std::array<int, lanes> child;
-    int leaf = -1;  ///< into leaves, or -1
+    int leaf = -1;     ///< into leaves, or -1
+    int children = 0;  ///< in the first lanes
   };
 
   /// The corners of a leaf's triangles, lane by lane; free lanes repeat the last triangle.
   struct alignas(32) Leaf {
     std::array<std::array<Row, 3>, 3> corners;  ///< corner, axis
-    std::array<Row, 3> normal;                  ///< unit, or zero where the triangle is degenerate
+    std::array<Row, 3> normal;                  ///< unit, or zero where the triangle has no sure plane
     Row offset;                                 ///< m, of the plane: normal . corner
     float extent = 0.0F;                        ///< m, the longest side of the box of any of them
   };
