@@ -76,6 +76,27 @@ void keep_first(std::size_t count, FlatLists& lists) {
   lists = std::move(kept);
 }
 
+/// Lists the ends of each patch's edges, and where in that list they are.
+void list_ends(const std::vector<Edge>& edges, SurfacePatches& patches) {
+  patches.edge_vertices.first = {0};
+  for (int patch = 0; patch < static_cast<int>(patches.leaf_of.size()); ++patch) {
+    std::vector<int> vertices;
+    for (const int* e = patches.edges.begin(patch); e != patches.edges.end(patch); ++e) {
+      vertices.insert(vertices.end(), edges[*e].begin(), edges[*e].end());
+    }
+    std::sort(vertices.begin(), vertices.end());
+    vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+    const auto place_of = [&](int vertex) {
+      return static_cast<int>(std::lower_bound(vertices.begin(), vertices.end(), vertex) - vertices.begin());
+    };
+    for (const int* e = patches.edges.begin(patch); e != patches.edges.end(patch); ++e) {
+      patches.ends.push_back({place_of(edges[*e][0]), place_of(edges[*e][1])});
+    }
+    patches.edge_vertices.items.insert(patches.edge_vertices.items.end(), vertices.begin(), vertices.end());
+    patches.edge_vertices.first.push_back(static_cast<int>(patches.edge_vertices.items.size()));
+  }
+}
+
 }  // namespace
 
 SurfacePatches build_patches(const std::vector<Vector3>& positions, const std::vector<Triangle>& triangles,
@@ -92,6 +113,7 @@ SurfacePatches build_patches(const std::vector<Vector3>& positions, const std::v
   list_items(patches, triangles, patches.vertices);
   list_items(patches, topology.triangle_edges, patches.edges);
   keep_first(topology.edges.size(), patches.edges);
+  list_ends(topology.edges, patches);
   patches.patch_of.assign(positions.size(), 0);
   for (int patch = 0; patch < static_cast<int>(patches.leaf_of.size()); ++patch) {
     for (const int* v = patches.vertices.begin(patch); v != patches.vertices.end(patch); ++v) {
