@@ -8,6 +8,9 @@ namespace tissue_sim {
 
 namespace {
 
+// Two numbers side by side, in plain arrays. As a `using` clang would drop the alignment.
+typedef double Two __attribute__((vector_size(16), aligned(8), may_alias));  // NOLINT(modernize-use-using)
+
 constexpr double never = -1e300;  ///< m; the box of what was fitted then is everywhere
 
 struct Builder {
@@ -142,15 +145,18 @@ void fit_patch(const OrganSurface& organ, SurfacePatches::Node& leaf) {
   const int* first = patches.vertices.begin(leaf.patch);
   const int* last = patches.vertices.end(leaf.patch);
   if (organ.placement.place) organ.placement.place(organ.placement.carrier, first, last);
-  Box box;
+  // What is not a number hides no other: no comparison with it holds.
+  Two lower = {1e300, 1e300}, upper = {-1e300, -1e300};
+  double lowest = 1e300, highest = -1e300;
   for (const int* v = first; v != last; ++v) {
     const Vector3& p = organ.positions[*v];
-    for (int i = 0; i < 3; ++i) {
-      box.lower[i] = std::min(box.lower[i], p[i]);  // what is not a number hides no other
-      box.upper[i] = std::max(box.upper[i], p[i]);
-    }
+    const Two& xy = *reinterpret_cast<const Two*>(p.data());
+    lower = xy < lower ? xy : lower;
+    upper = xy > upper ? xy : upper;
+    lowest = p.z() < lowest ? p.z() : lowest;
+    highest = p.z() > highest ? p.z() : highest;
   }
-  leaf.box = box;
+  leaf.box = {Vector3(lower[0], lower[1], lowest), Vector3(upper[0], upper[1], highest)};
   leaf.fitted_at = patches.travel;
 }
 

@@ -38,6 +38,15 @@ TISSUE_SIM_KERNEL __m512 side_of(const Vectors& a, const Vectors& b, const Vecto
   return _mm512_add_ps(_mm512_add_ps(_mm512_mul_ps(x, along.x), _mm512_mul_ps(y, along.y)), _mm512_mul_ps(z, along.z));
 }
 
+// With a mask of all lanes: without one g++ 12 warns of a register in its own header that is not set.
+constexpr __mmask16 all_lanes = 0xFFFF;
+TISSUE_SIM_KERNEL __m512 smaller(const __m512& a, const __m512& b) {
+  return _mm512_maskz_min_ps(all_lanes, a, b);
+}
+TISSUE_SIM_KERNEL __m512 larger(const __m512& a, const __m512& b) {
+  return _mm512_maskz_max_ps(all_lanes, a, b);
+}
+
 TISSUE_SIM_KERNEL void write(__mmask16 bits, std::size_t kind, std::size_t group, PointCodes& codes) {
   const auto two_bytes = static_cast<std::uint16_t>(bits);
   std::memcpy(&codes.bytes[kind][2 * group], &two_bytes, sizeof two_bytes);
@@ -109,16 +118,14 @@ TISSUE_SIM_TARGET std::size_t keep_within_rims_avx512(const NearTriangles& near,
     const __m512 rim_a = side_of(a, b, way);
     const __m512 rim_b = side_of(b, c, way);
     const __m512 rim_c = side_of(c, a, way);
-    const auto above_a = _mm512_cmp_ps_mask(rim_a, unsure, _CMP_GT_OQ);
-    const auto above_b = _mm512_cmp_ps_mask(rim_b, unsure, _CMP_GT_OQ);
-    const auto above_c = _mm512_cmp_ps_mask(rim_c, unsure, _CMP_GT_OQ);
-    const auto below_a = _mm512_cmp_ps_mask(rim_a, minus_unsure, _CMP_LT_OQ);
-    const auto below_b = _mm512_cmp_ps_mask(rim_b, minus_unsure, _CMP_LT_OQ);
-    const auto below_c = _mm512_cmp_ps_mask(rim_c, minus_unsure, _CMP_LT_OQ);
-    const unsigned above = static_cast<unsigned>(above_a | above_b | above_c);
-    const unsigned below = static_cast<unsigned>(below_a | below_b | below_c);
-    visit.triangles &= ~(above & below);
-    visit.within_rims = static_cast<unsigned>((above_a & above_b & above_c) | (below_a & below_b & below_c));
+    const __m512 least = smaller(smaller(rim_a, rim_b), rim_c);
+    const __m512 most = larger(larger(rim_b, rim_a), rim_c);
+    const __mmask16 above = _mm512_cmp_ps_mask(most, unsure, _CMP_GT_OQ);
+    const __mmask16 all_above = _mm512_cmp_ps_mask(least, unsure, _CMP_GT_OQ);
+    const __mmask16 all_below = _mm512_cmp_ps_mask(most, minus_unsure, _CMP_LT_OQ);
+    const __mmask16 apart = _mm512_mask_cmp_ps_mask(above, least, minus_unsure, _CMP_LT_OQ);
+    visit.triangles &= ~static_cast<unsigned>(apart);
+    visit.within_rims = static_cast<unsigned>(all_above) | static_cast<unsigned>(all_below);
     visits[kept] = visit;
     kept += visit.triangles != 0 ? 1 : 0;
   }

@@ -118,12 +118,12 @@ TISSUE_SIM_INLINE unsigned within_rims(const NearTriangles& near, std::size_t fi
     const Lane rim_a = ab.x * x + ab.y * y + ab.z * z;
     const Lane rim_b = bc.x * x + bc.y * y + bc.z * z;
     const Lane rim_c = ca.x * x + ca.y * y + ca.z * z;
-    const auto above = (rim_a > unsure) | (rim_b > unsure) | (rim_c > unsure);
-    const auto below = (rim_a < -unsure) | (rim_b < -unsure) | (rim_c < -unsure);
-    const auto all_above = (rim_a > unsure) & (rim_b > unsure) & (rim_c > unsure);
-    const auto all_below = (rim_a < -unsure) & (rim_b < -unsure) & (rim_c < -unsure);
-    bits |= bits_of(~(above & below)) << l;
-    bits_within |= bits_of(all_above | all_below) << l;
+    const Lane least_ab = rim_a < rim_b ? rim_a : rim_b;
+    const Lane most_ab = rim_a < rim_b ? rim_b : rim_a;
+    const Lane least = least_ab < rim_c ? least_ab : rim_c;
+    const Lane most = most_ab > rim_c ? most_ab : rim_c;
+    bits |= bits_of(~((most > unsure) & (least < -unsure))) << l;
+    bits_within |= bits_of((least > unsure) | (most < -unsure)) << l;
   }
   within = bits_within;
   return bits;
@@ -141,7 +141,7 @@ TISSUE_SIM_INLINE void for_each_leaf(const WideTree& tree, const FloatPoint& low
     for (unsigned bits = overlapping<Lane>(node, lower, upper); bits != 0; bits &= bits - 1) {
       const auto l = static_cast<std::size_t>(__builtin_ctz(bits));
       const int child = node.child[l];
-      if (tree.nodes[static_cast<std::size_t>(child)].leaf >= 0) {
+      if ((node.leaf_children >> l & 1U) != 0) {
         visit(node, l);
       } else {
         stack.push_back(child);
@@ -158,6 +158,7 @@ void clear(WideTree::Node& node) {
   }
   node.child.fill(-1);
   node.children = 0;
+  node.leaf_children = 0;
 }
 
 /// Lists the leaves near to a box.
@@ -342,10 +343,17 @@ TISSUE_SIM_INLINE void test_packed(const NearEdges& edges, float farthest, WideT
     }
   }
   kept = Packed::keep_within_rims(near, edges, farthest, visits.data(), kept);
+  std::size_t found = pairs.size();
+  std::size_t more = 0;
+  for (std::size_t i = 0; i < kept; ++i) more += static_cast<std::size_t>(__builtin_popcount(visits[i].triangles));
+  pairs.resize(found + more);
   for (std::size_t i = 0; i < kept; ++i) {
-    for (unsigned bits = visits[i].triangles; bits != 0; bits &= bits - 1) {
-      const auto at = static_cast<std::size_t>(visits[i].first + __builtin_ctz(bits));
-      pairs.push_back({edges.edges[visits[i].edge], near.triangle[at], (visits[i].within_rims & bits & -bits) != 0});
+    const EdgeVisit& visit = visits[i];
+    for (unsigned bits = visit.triangles; bits != 0; bits &= bits - 1) {
+      EdgeTrianglePair& pair = pairs[found++];  // field by field: a whole one would wait for its parts
+      pair.edge = edges.edges[visit.edge];
+      pair.triangle = near.triangle[static_cast<std::size_t>(visit.first + __builtin_ctz(bits))];
+      pair.within_rims = (visit.within_rims & bits & -bits) != 0;
     }
   }
 }
@@ -589,6 +597,9 @@ struct Builder {
       const Box of_part =
           build_node(children + part, first + starts[part], starts[part + 1] - starts[part], height + 1);
       set_lane(index, static_cast<std::size_t>(part), of_part, children + part);
+      if (tree.nodes[static_cast<std::size_t>(children + part)].leaf >= 0) {
+        tree.nodes[static_cast<std::size_t>(index)].leaf_children |= 1U << static_cast<unsigned>(part);
+      }
       box.add(of_part);
     }
     return box;

@@ -37,6 +37,7 @@ struct WideTree {
     std::array<int, lanes> child;
     int leaf = -1;     ///< into leaves, or -1
     int children = 0;  ///< in the first lanes
+    unsigned leaf_children = 0;  ///< which of them are leaves, a bit each: saves a look at them
   };
 
   /// The corners of a leaf's triangles, lane by lane; free lanes repeat the last triangle.
@@ -72,7 +73,7 @@ struct NearEdges {
 };
 
 /// Triangles near to some edges, packed side by side.
-struct alignas(32) NearTriangles {
+struct alignas(64) NearTriangles {
   static constexpr std::size_t most = 256;
   using Row = std::array<float, most + 16>;  ///< as many as a register has are written and read where the last begin
 
