@@ -62,26 +62,35 @@ void gather_pairs(const OrganSurface& organ, const InstrumentSurface& instrument
     const Box& box = organ.patches.nodes[organ.patches.leaf_of[patch]].box;
     const Vector3 middle = back * (0.5 * (box.lower + box.upper) - pose.position);
     if (is_clear(instrument, middle, 0.5 * box.size().norm() + clear_margin, d.free_balls[patch])) return;
-    d.rounded.clear();
-    for (const int* v = vertices.begin(patch); v != vertices.end(patch); ++v) {
+    const auto points = static_cast<std::size_t>(vertices.end(patch) - vertices.begin(patch));
+    if (d.rounded.size() < points) d.rounded.resize(points);
+    FloatPoint* rounded = d.rounded.data();
+    for (const int* v = vertices.begin(patch); v != vertices.end(patch); ++v, ++rounded) {
       if (d.local_stamp[*v] != d.stamp) {
         d.local_stamp[*v] = d.stamp;
         d.local[*v] = back * (organ.positions[*v] - pose.position) + tie_break;  // as local_position()
       }
-      d.rounded.push_back(to_float(d.local[*v]));
+      // One by one: a whole point, pushed back, would wait for its parts.
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        (*rounded)[axis] = static_cast<float>(d.local[*v][static_cast<Eigen::Index>(axis)]);
+      }
     }
     const auto count = static_cast<std::size_t>(edges.end(patch) - edges.begin(patch));
     const Edge* ends = organ.patches.ends.data() + edges.first[patch];
-    find_crossing_pairs(instrument.tree, {d.rounded.data(), d.rounded.size(), ends, edges.begin(patch), count},
+    find_crossing_pairs(instrument.tree, {d.rounded.data(), points, ends, edges.begin(patch), count},
                         d.tree_room, d.pairs);
   });
 }
 
 /// Of the pairs, in their order, those whose edge goes through the plane. Returns how many.
 std::size_t hit_planes(const OrganSurface& organ, const InstrumentSurface& instrument, Detection& d) {
+  constexpr std::size_t ahead = 12;
   if (d.hits.size() < d.pairs.size()) d.hits.resize(d.pairs.size());
   std::size_t kept = 0;
-  for (const EdgeTrianglePair& pair : d.pairs) {
+  for (std::size_t i = 0; i < d.pairs.size(); ++i) {
+    const EdgeTrianglePair& pair = d.pairs[i];
+    // Planes lie where no one can guess, and too many for the nearest cache.
+    if (i + ahead < d.pairs.size()) __builtin_prefetch(&instrument.planes[d.pairs[i + ahead].triangle]);
     const auto& [first, last] = organ.topology.edges[pair.edge];
     const TrianglePlane& plane = instrument.planes[pair.triangle];
     const EdgeTriangleHit hit = hit_plane(d.local[first], d.local[last], plane.corner, plane.normal);

@@ -16,16 +16,18 @@ bool healthy(const Vector3& rest, const Vector3& position, const Vector3& veloci
   return (position - rest).squaredNorm() < limit && velocity.squaredNorm() < fastest * fastest;
 }
 
-/// Of at(0) .. at(count - 1), in four sums side by side.
+/// Of at(0) .. at(count - 1), in sums side by side: one would wait for each addition.
 template <class At>
 double sum_of_squares(std::size_t count, const At& at) {
-  std::array<double, 4> sums{};
+  std::array<double, 8> sums{};
   std::size_t i = 0;
-  for (; i + 4 <= count; i += 4) {
-    for (std::size_t k = 0; k < 4; ++k) sums[k] += at(i + k) * at(i + k);
+  for (; i + sums.size() <= count; i += sums.size()) {
+    for (std::size_t k = 0; k < sums.size(); ++k) sums[k] += at(i + k) * at(i + k);
   }
-  for (; i < count; ++i) sums[0] += at(i) * at(i);
-  return sums[0] + sums[1] + sums[2] + sums[3];
+  double sum = 0.0;
+  for (; i < count; ++i) sum += at(i) * at(i);
+  for (const double s : sums) sum += s;
+  return sum;
 }
 
 /// Mostly all vertices together stay below what each of them may have, and that is quickly said.
