@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <numeric>
 
@@ -228,6 +227,9 @@ TISSUE_SIM_INLINE std::size_t pack_triangles(const WideTree& tree, const FloatPo
   return from;
 }
 
+using FourWords = std::uint64_t __attribute__((vector_size(32)));
+static_assert(sizeof(PointCodes) == 2 * sizeof(FourWords), "eight kinds of a word each");
+
 template <std::size_t bytes>
 struct LaneOf {
   typedef Four Type;  // NOLINT(modernize-use-using): its attributes count
@@ -245,26 +247,32 @@ struct PackedIn {
 
   static TISSUE_SIM_INLINE void code_points(const NearTriangles& near, std::size_t first, std::size_t count,
                                             const NearEdges& edges, float farthest, PointCodes* codes) {
+    constexpr std::size_t width = bytes / sizeof(float);
+    constexpr unsigned all = (1U << width) - 1;
     const float unsure = unsure_height(farthest);
-    for (std::size_t byte = 0; lanes * byte < count; ++byte) {
+    for (std::size_t group = 0; group < count; group += width) {
+      // Copies, since a byte that is written might be anybody's.
+      Lane lower[3], upper[3], normal[3];
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        lower[axis] = lane<Lane>(near.lower[axis], first + group);
+        upper[axis] = lane<Lane>(near.upper[axis], first + group);
+        normal[axis] = lane<Lane>(near.normal[axis], first + group);
+      }
+      const Lane offset = lane<Lane>(near.offset, first + group);
+      const std::size_t shift = width < lanes ? group % lanes : 0;
       for (std::size_t i = 0; i < edges.point_count; ++i) {
-        const FloatPoint& p = edges.points[i];
-        std::array<unsigned, PointCodes::kinds> bits{};
-        for (std::size_t l = 0; l < lanes; l += sizeof(Lane) / sizeof(float)) {
-          const std::size_t at = first + lanes * byte + l;
-          for (std::size_t axis = 0; axis < 3; ++axis) {
-            bits[2 * axis] |= bits_of(lane<Lane>(near.upper[axis], at) >= p[axis]) << l;
-            bits[2 * axis + 1] |= bits_of(lane<Lane>(near.lower[axis], at) <= p[axis]) << l;
-          }
-          const Lane height = lane<Lane>(near.normal[0], at) * p[0] + lane<Lane>(near.normal[1], at) * p[1] +
-                              lane<Lane>(near.normal[2], at) * p[2] - lane<Lane>(near.offset, at);
-          bits[PointCodes::not_in_front] |= bits_of(height > unsure) << l;
-          bits[PointCodes::not_behind] |= bits_of(height < -unsure) << l;
+        const FloatPoint p = edges.points[i];
+        std::array<unsigned, PointCodes::kinds> bits;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          bits[2 * axis] = bits_of(upper[axis] >= p[axis]);
+          bits[2 * axis + 1] = bits_of(lower[axis] <= p[axis]);
         }
-        bits[PointCodes::not_in_front] = ~bits[PointCodes::not_in_front];  // also where the height is not a number
-        bits[PointCodes::not_behind] = ~bits[PointCodes::not_behind];
+        const Lane height = normal[0] * p[0] + normal[1] * p[1] + normal[2] * p[2] - offset;
+        bits[PointCodes::not_in_front] = all & ~bits_of(height > unsure);  // also where it is not a number
+        bits[PointCodes::not_behind] = all & ~bits_of(height < -unsure);
         for (std::size_t kind = 0; kind < PointCodes::kinds; ++kind) {
-          codes[i].bytes[kind][byte] = static_cast<unsigned char>(bits[kind] & 0xFFU);
+          unsigned char& byte = codes[i].bytes[kind][group / lanes];
+          byte = static_cast<unsigned char>(bits[kind] << shift | (shift != 0 ? byte : 0U));
         }
       }
     }
@@ -273,12 +281,11 @@ struct PackedIn {
   static TISSUE_SIM_INLINE void find_candidates(const NearEdges& edges, const PointCodes* codes, std::uint64_t all,
                                                 std::size_t step, std::uint64_t* candidates) {
     for (std::size_t e = 0; e < edges.count; ++e) {
-      std::array<std::uint64_t, PointCodes::kinds> of_p, of_q;
-      std::memcpy(of_p.data(), codes + edges.ends[e][0], sizeof of_p);
-      std::memcpy(of_q.data(), codes + edges.ends[e][1], sizeof of_q);
-      std::uint64_t kept = all;
-      for (std::size_t kind = 0; kind < PointCodes::kinds; ++kind) kept &= of_p[kind] | of_q[kind];
-      candidates[e * step] = kept;
+      std::array<FourWords, 2> p, q;
+      std::memcpy(&p, codes + edges.ends[e][0], sizeof p);
+      std::memcpy(&q, codes + edges.ends[e][1], sizeof q);
+      const FourWords kept = (p[0] | q[0]) & (p[1] | q[1]);
+      candidates[e * step] = all & kept[0] & kept[1] & kept[2] & kept[3];
     }
   }
 
