@@ -184,12 +184,12 @@ struct PackingOrder {
 constexpr PackingOrder packing_order;
 
 /// Writes the chosen lanes of eight one behind the other, and anything behind them.
-template <class Lane>
-TISSUE_SIM_INLINE void pack_row(const WideTree::Row& row, unsigned chosen, float* to) {
+template <class Lane, class Number>
+TISSUE_SIM_INLINE void pack_row(const std::array<Number, lanes>& row, unsigned chosen, Number* to) {
 #if defined(__x86_64__) && !defined(__clang__)
   if (sizeof(Lane) == sizeof(Eight)) {
     const EightBits& order = reinterpret_cast<const EightBits&>(packing_order.of[chosen]);
-    *reinterpret_cast<Eight*>(to) = __builtin_shuffle(lane<EightFloats>(row, 0), order);
+    *reinterpret_cast<Eight*>(to) = __builtin_shuffle(reinterpret_cast<const EightFloats&>(row), order);
     return;
   }
 #endif
@@ -220,9 +220,8 @@ TISSUE_SIM_INLINE std::size_t pack_triangles(const WideTree& tree, const FloatPo
     }
     pack_row<Lane>(leaf.offset, chosen, &near.offset[to]);
     near.extent = std::max(near.extent, leaf.extent);
-    for (unsigned bits = chosen; bits != 0; bits &= bits - 1) {
-      near.triangle[near.count++] = node.child[static_cast<std::size_t>(__builtin_ctz(bits))];
-    }
+    pack_row<Lane>(node.child, chosen, &near.triangle[to]);
+    near.count += static_cast<std::size_t>(__builtin_popcount(chosen));
   }
   return from;
 }
@@ -341,11 +340,12 @@ TISSUE_SIM_INLINE void test_packed(const NearEdges& edges, float farthest, WideT
   std::size_t kept = 0;
   for (std::size_t e = 0; e < edges.count; ++e) {
     for (std::size_t word = 0; word < words; ++word) {
-      for (std::uint64_t left = room.candidates[e * words + word]; left != 0;) {
-        const std::size_t at = static_cast<std::size_t>(__builtin_ctzll(left)) / group * group;
-        visits[kept++] = {static_cast<int>(e), static_cast<int>(in_word * word + at),
-                          static_cast<unsigned>((left >> at) & of_group), 0};
-        left &= ~(of_group << at);
+      const std::uint64_t candidates = room.candidates[e * words + word];
+      const std::size_t count = std::min(in_word, near.count - in_word * word);
+      for (std::size_t at = 0; at < count; at += group) {
+        const auto triangles = static_cast<unsigned>((candidates >> at) & of_group);
+        visits[kept] = {static_cast<int>(e), static_cast<int>(in_word * word + at), triangles, 0};
+        kept += triangles != 0 ? 1 : 0;
       }
     }
   }
