@@ -55,53 +55,76 @@ bool is_clear(const InstrumentSurface& instrument, const Vector3& middle, double
 /// Pairs of organ edges and instrument triangles that may cross.
 void gather_pairs(const OrganSurface& organ, const InstrumentSurface& instrument, const Pose& pose, Detection& d) {
   d.pairs.clear();
-  const FlatLists& vertices = organ.patches.vertices;
+  const FlatLists& vertices = organ.patches.edge_vertices;
   const FlatLists& edges = organ.patches.edges;
   const Eigen::Quaterniond back = pose.orientation.conjugate();
   for_each_patch_near(organ, scene_bounds(instrument.bounds, pose), [&](int patch) {
     const Box& box = organ.patches.nodes[organ.patches.leaf_of[patch]].box;
     const Vector3 middle = back * (0.5 * (box.lower + box.upper) - pose.position);
     if (is_clear(instrument, middle, 0.5 * box.size().norm() + clear_margin, d.free_balls[patch])) return;
-    for (const int* v = vertices.begin(patch); v != vertices.end(patch); ++v) {
-      if (d.local_stamp[*v] == d.stamp) continue;
-      d.local_stamp[*v] = d.stamp;
-      d.local[*v] = back * (organ.positions[*v] - pose.position) + tie_break;  // as local_position()
-      d.local_rounded[*v] = to_float(d.local[*v]);
+    const auto points = static_cast<std::size_t>(vertices.end(patch) - vertices.begin(patch));
+    if (d.rounded.size() < points) d.rounded.resize(points);
+    FloatPoint* rounded = d.rounded.data();
+    for (const int* v = vertices.begin(patch); v != vertices.end(patch); ++v, ++rounded) {
+      if (d.local_stamp[*v] != d.stamp) {
+        d.local_stamp[*v] = d.stamp;
+        d.local[*v] = back * (organ.positions[*v] - pose.position) + tie_break;  // as local_position()
+      }
+      // One by one: a whole point, pushed back, would wait for its parts.
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        (*rounded)[axis] = static_cast<float>(d.local[*v][static_cast<Eigen::Index>(axis)]);
+      }
     }
     const auto count = static_cast<std::size_t>(edges.end(patch) - edges.begin(patch));
-    find_crossing_pairs(instrument.tree, d.local_rounded, organ.topology.edges, edges.begin(patch), count, d.tree_room,
-                        d.pairs);
+    const Edge* ends = organ.patches.ends.data() + edges.first[patch];
+    find_crossing_pairs(instrument.tree, {d.rounded.data(), points, ends, edges.begin(patch), count},
+                        d.tree_room, d.pairs);
   });
 }
 
-EdgeTriangleHit hit_triangle(const Vector3& p, const Vector3& q, const InstrumentSurface& instrument, int triangle) {
-  const Triangle& corners = instrument.triangles[triangle];
-  return hit_edge_triangle(
+/// Of the pairs, in their order, those whose edge goes through the plane. Returns how many.
+std::size_t hit_planes(const OrganSurface& organ, const InstrumentSurface& instrument, Detection& d) {
+  constexpr std::size_t ahead = 12;
+  if (d.hits.size() < d.pairs.size()) d.hits.resize(d.pairs.size());
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < d.pairs.size(); ++i) {
+    const EdgeTrianglePair& pair = d.pairs[i];
+    // Planes lie where no one can guess, and too many for the nearest cache.
+    if (i + ahead < d.pairs.size()) __builtin_prefetch(&instrument.planes[d.pairs[i + ahead].triangle]);
+    const auto& [first, last] = organ.topology.edges[pair.edge];
+    const TrianglePlane& plane = instrument.planes[pair.triangle];
+    const EdgeTriangleHit hit = hit_plane(d.local[first], d.local[last], plane.corner, plane.normal);
+    d.hits[kept] = {pair.edge, pair.triangle, hit.t, hit.direction, pair.within_rims};
+    kept += hit.direction != 0 ? 1 : 0;
+  }
+  return kept;
+}
+
+bool within_rims(const Vector3& p, const Vector3& q, const InstrumentSurface& instrument, const PlaneHit& hit) {
+  if (hit.within_rims) return true;
+  const Triangle& corners = instrument.triangles[hit.triangle];
+  return passes_within_rims(
       p, q, {&instrument.vertices[corners[0]], &instrument.vertices[corners[1]], &instrument.vertices[corners[2]]},
       corners);
 }
 
-/// Takes the crossings of one edge with the triangles of pairs first .. last - 1 and labels its ends by the first and
-/// the last of them.
-void cross_edge(const OrganSurface& organ, const InstrumentSurface& instrument, std::size_t first_pair,
-                std::size_t last_pair, Detection& d) {
-  const int edge = d.pairs[first_pair].edge;
+/// Takes the crossings of one edge, of hits first .. last - 1, and labels its ends by the first and the last of them.
+void cross_edge(const OrganSurface& organ, const InstrumentSurface& instrument, std::size_t first_hit,
+                std::size_t last_hit, Detection& d) {
+  const int edge = d.hits[first_hit].edge;
   const auto& [first, last] = organ.topology.edges[edge];
   const Vector3& p = d.local[first];
   const Vector3& q = d.local[last];
 
   const std::size_t begin = d.crossings.size();
-  for (std::size_t pair = first_pair; pair < last_pair; ++pair) {
-    const int triangle = d.pairs[pair].triangle;
-    const TrianglePlane& plane = instrument.planes[triangle];
-    const EdgeTriangleHit hit = d.pairs[pair].within_rims ? hit_within_rims(p, q, plane.corner, plane.normal)
-                                                          : hit_triangle(p, q, instrument, triangle);
-    if (hit.direction == 0) continue;
-    d.crossings.push_back({edge, triangle, hit.t, hit.direction, p + hit.t * (q - p)});
+  for (std::size_t i = first_hit; i < last_hit; ++i) {
+    const PlaneHit& hit = d.hits[i];
+    if (!within_rims(p, q, instrument, hit)) continue;
+    d.crossings.push_back({edge, hit.triangle, hit.t, hit.direction, p + hit.t * (q - p)});
     // Mostly there are one or two: they are put in order as they come.
-    for (std::size_t i = d.crossings.size() - 1; i > begin; --i) {
-      Crossing& before = d.crossings[i - 1];
-      Crossing& after = d.crossings[i];
+    for (std::size_t c = d.crossings.size() - 1; c > begin; --c) {
+      Crossing& before = d.crossings[c - 1];
+      Crossing& after = d.crossings[c];
       if (before.t < after.t || (before.t == after.t && before.triangle < after.triangle)) break;
       std::swap(before, after);
     }
@@ -130,8 +153,9 @@ void cross_edge(const OrganSurface& organ, const InstrumentSurface& instrument, 
 void cross_edges(const OrganSurface& organ, const InstrumentSurface& instrument, Detection& d) {
   d.crossings.clear();
   d.unordered.clear();
-  for (std::size_t first = 0, last = 0; first < d.pairs.size(); first = last) {
-    while (last < d.pairs.size() && d.pairs[last].edge == d.pairs[first].edge) ++last;
+  const std::size_t hits = hit_planes(organ, instrument, d);
+  for (std::size_t first = 0, last = 0; first < hits; first = last) {
+    while (last < hits && d.hits[last].edge == d.hits[first].edge) ++last;
     cross_edge(organ, instrument, first, last, d);
   }
   d.stack.clear();
@@ -226,7 +250,6 @@ void prepare(Detection& d, const OrganSurface& organ) {
   d.crossed_edge_of.assign(edges, -1);
   d.nearest.assign(vertices, -1);
   d.free_balls.assign(organ.patches.leaf_of.size(), FreeBall());
-  d.local_rounded.assign(vertices, FloatPoint());
   d.edge_set.prepare(edges);
   d.vertex_set.prepare(vertices);
   d.outside_set.prepare(vertices);
@@ -243,7 +266,6 @@ const Vector3& local_position(Detection& d, const OrganSurface& organ, const Pos
     place_vertex(organ, vertex);
     d.local_stamp[vertex] = d.stamp;
     d.local[vertex] = pose.apply_inverse(organ.positions[vertex]) + tie_break;
-    d.local_rounded[vertex] = to_float(d.local[vertex]);
   }
   return d.local[vertex];
 }

@@ -34,6 +34,18 @@ double radius_at(const InstrumentSurface& surface, int vertex) {
   return smallest;
 }
 
+/// As pseudonormal() and normalised, from what was computed when the surface was built.
+Vector3 normal_at(const InstrumentSurface& surface, int triangle, Feature feature) {
+  if (feature == Feature::face) return surface.normals[triangle];
+  const int which = static_cast<int>(feature) % 3;
+  if (feature < Feature::rim_0) return surface.vertex_normals[surface.triangles[triangle][which]];
+  Vector3 sum = Vector3::Zero();
+  for (const int t : surface.topology.edge_triangles[surface.topology.triangle_edges[triangle][which]]) {
+    if (t >= 0) sum += surface.normals[t];
+  }
+  return sum.stableNormalized();
+}
+
 }  // namespace
 
 InstrumentSurface build_instrument_surface(const TriangleMesh& mesh, bool closed) {
@@ -83,9 +95,7 @@ Box scene_bounds(const Box& box, const Pose& pose) {
 ClosestFeature closest_feature(const InstrumentSurface& surface, const Vector3& p, double reach, int guess) {
   const ClosestOnMesh closest = closest_on_mesh(surface.vertices, surface.triangles, surface.tree, p, reach, guess);
   if (closest.triangle < 0) return {p, Vector3::UnitZ(), -std::numeric_limits<double>::max(), -1};
-  const Vector3 normal =
-      pseudonormal(surface.vertices, surface.triangles, surface.topology, closest.triangle, closest.on.feature)
-          .stableNormalized();
+  const Vector3 normal = normal_at(surface, closest.triangle, closest.on.feature);
   const Vector3 way_out = closest.on.point - p;
   const double distance = std::sqrt(closest.squared_distance);
   const bool inside = way_out.dot(normal) > 0.0;

@@ -26,6 +26,10 @@ struct Mobility {
 };
 
 Mobility mobility(const ContactPoint& point, const std::vector<double>& inverse_mass) {
+  if (point.bearers.count == 1) {  // most points are vertices
+    const double weight = point.bearers.weights[0];
+    return {weight * (weight * inverse_mass[point.bearers.vertices[0]]), false};
+  }
   double sum = 0.0;
   double most = 0.0;
   bool attached = false;

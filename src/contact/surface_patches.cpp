@@ -8,6 +8,9 @@ namespace tissue_sim {
 
 namespace {
 
+// Two numbers side by side, in plain arrays. As a `using` clang would drop the alignment.
+typedef double Two __attribute__((vector_size(16), aligned(8), may_alias));  // NOLINT(modernize-use-using)
+
 constexpr double never = -1e300;  ///< m; the box of what was fitted then is everywhere
 
 struct Builder {
@@ -76,6 +79,27 @@ void keep_first(std::size_t count, FlatLists& lists) {
   lists = std::move(kept);
 }
 
+/// Lists the ends of each patch's edges, and where in that list they are.
+void list_ends(const std::vector<Edge>& edges, SurfacePatches& patches) {
+  patches.edge_vertices.first = {0};
+  for (int patch = 0; patch < static_cast<int>(patches.leaf_of.size()); ++patch) {
+    std::vector<int> vertices;
+    for (const int* e = patches.edges.begin(patch); e != patches.edges.end(patch); ++e) {
+      vertices.insert(vertices.end(), edges[*e].begin(), edges[*e].end());
+    }
+    std::sort(vertices.begin(), vertices.end());
+    vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+    const auto place_of = [&](int vertex) {
+      return static_cast<int>(std::lower_bound(vertices.begin(), vertices.end(), vertex) - vertices.begin());
+    };
+    for (const int* e = patches.edges.begin(patch); e != patches.edges.end(patch); ++e) {
+      patches.ends.push_back({place_of(edges[*e][0]), place_of(edges[*e][1])});
+    }
+    patches.edge_vertices.items.insert(patches.edge_vertices.items.end(), vertices.begin(), vertices.end());
+    patches.edge_vertices.first.push_back(static_cast<int>(patches.edge_vertices.items.size()));
+  }
+}
+
 }  // namespace
 
 SurfacePatches build_patches(const std::vector<Vector3>& positions, const std::vector<Triangle>& triangles,
@@ -92,6 +116,7 @@ SurfacePatches build_patches(const std::vector<Vector3>& positions, const std::v
   list_items(patches, triangles, patches.vertices);
   list_items(patches, topology.triangle_edges, patches.edges);
   keep_first(topology.edges.size(), patches.edges);
+  list_ends(topology.edges, patches);
   patches.patch_of.assign(positions.size(), 0);
   for (int patch = 0; patch < static_cast<int>(patches.leaf_of.size()); ++patch) {
     for (const int* v = patches.vertices.begin(patch); v != patches.vertices.end(patch); ++v) {
@@ -120,15 +145,18 @@ void fit_patch(const OrganSurface& organ, SurfacePatches::Node& leaf) {
   const int* first = patches.vertices.begin(leaf.patch);
   const int* last = patches.vertices.end(leaf.patch);
   if (organ.placement.place) organ.placement.place(organ.placement.carrier, first, last);
-  Box box;
+  // What is not a number hides no other: no comparison with it holds.
+  Two lower = {1e300, 1e300}, upper = {-1e300, -1e300};
+  double lowest = 1e300, highest = -1e300;
   for (const int* v = first; v != last; ++v) {
     const Vector3& p = organ.positions[*v];
-    for (int i = 0; i < 3; ++i) {
-      box.lower[i] = std::min(box.lower[i], p[i]);  // what is not a number hides no other
-      box.upper[i] = std::max(box.upper[i], p[i]);
-    }
+    const Two& xy = *reinterpret_cast<const Two*>(p.data());
+    lower = xy < lower ? xy : lower;
+    upper = xy > upper ? xy : upper;
+    lowest = p.z() < lowest ? p.z() : lowest;
+    highest = p.z() > highest ? p.z() : highest;
   }
-  leaf.box = box;
+  leaf.box = {Vector3(lower[0], lower[1], lowest), Vector3(upper[0], upper[1], highest)};
   leaf.fitted_at = patches.travel;
 }
 

@@ -27,37 +27,23 @@ inline int side_of_rim(const Vector3& along, double along_squared, const Vector3
 
 }  // namespace
 
-EdgeTriangleHit hit_edge_triangle(const Vector3& p, const Vector3& q, const std::array<const Vector3*, 3>& points,
-                                  const Triangle& indices) {
-  const Vector3& a = *points[0];
-  const Vector3& b = *points[1];
-  const Vector3& c = *points[2];
-  const Vector3 normal = area_normal(a, b, c);
-  const double height_p = normal.dot(p - a);
-  const double height_q = normal.dot(q - a);
-  if ((height_p < 0.0) == (height_q < 0.0)) return {};
-
+bool passes_within_rims(const Vector3& p, const Vector3& q, const std::array<const Vector3*, 3>& points,
+                        const Triangle& indices) {
   const Vector3 along = q - p;
   const double squared = along.squaredNorm();
-  const Vector3 to_a = a - p;
-  const Vector3 to_b = b - p;
-  const Vector3 to_c = c - p;
+  const Vector3 to_a = *points[0] - p;
+  const Vector3 to_b = *points[1] - p;
+  const Vector3 to_c = *points[2] - p;
   const int side = side_of_rim(along, squared, to_a, to_b, indices[0] < indices[1]);
-  if (side != side_of_rim(along, squared, to_b, to_c, indices[1] < indices[2])) return {};
-  if (side != side_of_rim(along, squared, to_c, to_a, indices[2] < indices[0])) return {};
-
-  const double t = height_p / (height_p - height_q);
-  if (!(t >= 0.0 && t <= 1.0)) return {};
-  return {height_p < 0.0 ? 1 : -1, t};
+  return side == side_of_rim(along, squared, to_b, to_c, indices[1] < indices[2]) &&
+         side == side_of_rim(along, squared, to_c, to_a, indices[2] < indices[0]);
 }
 
-EdgeTriangleHit hit_within_rims(const Vector3& p, const Vector3& q, const Vector3& corner, const Vector3& normal) {
-  const double height_p = normal.dot(p - corner);
-  const double height_q = normal.dot(q - corner);
-  if ((height_p < 0.0) == (height_q < 0.0)) return {};
-  const double t = height_p / (height_p - height_q);
-  if (!(t >= 0.0 && t <= 1.0)) return {};
-  return {height_p < 0.0 ? 1 : -1, t};
+EdgeTriangleHit hit_edge_triangle(const Vector3& p, const Vector3& q, const std::array<const Vector3*, 3>& points,
+                                  const Triangle& indices) {
+  const EdgeTriangleHit hit = hit_plane(p, q, *points[0], area_normal(*points[0], *points[1], *points[2]));
+  if (hit.direction == 0 || !passes_within_rims(p, q, points, indices)) return {};
+  return hit;
 }
 
 }  // namespace tissue_sim

@@ -5,6 +5,8 @@
 #include <limits>
 #include <numeric>
 
+#include "packed_triangles.h"
+
 #ifdef __x86_64__
 #include <immintrin.h>
 #endif
@@ -20,15 +22,10 @@ typedef float Four __attribute__((vector_size(16), aligned(4), may_alias));   //
 typedef float Eight __attribute__((vector_size(32), aligned(4), may_alias));  // NOLINT(modernize-use-using)
 using FourBits = int __attribute__((vector_size(16), may_alias));
 using EightBits = int __attribute__((vector_size(32)));
+using EightFloats = float __attribute__((vector_size(32), may_alias));
 
 constexpr std::size_t lanes = WideTree::lanes;
 constexpr float infinite = std::numeric_limits<float>::infinity();
-
-/// More leaves than this near to a group of edges: each of them goes down the tree by itself.
-constexpr std::size_t most_near_leaves = 64;
-
-/// Half of the last place of a float of size one.
-constexpr float rounding = 5.96e-8F;
 
 TISSUE_SIM_INLINE unsigned bits_of(const FourBits& lanes_set) {
 #ifdef __x86_64__
@@ -40,12 +37,15 @@ TISSUE_SIM_INLINE unsigned bits_of(const FourBits& lanes_set) {
 #endif
 }
 TISSUE_SIM_INLINE unsigned bits_of(const EightBits& lanes_set) {
+#if defined(__x86_64__) && !defined(__clang__)
+  return static_cast<unsigned>(__builtin_ia32_movmskps256(reinterpret_cast<const EightFloats&>(lanes_set)));
+#endif
   const FourBits* halves = reinterpret_cast<const FourBits*>(&lanes_set);
   return bits_of(halves[0]) | bits_of(halves[1]) << 4U;
 }
 
-template <class Lane>
-TISSUE_SIM_INLINE const Lane& lane(const WideTree::Row& row, std::size_t first) {
+template <class Lane, class Row>
+TISSUE_SIM_INLINE const Lane& lane(const Row& row, std::size_t first) {
   return *reinterpret_cast<const Lane*>(row.data() + first);
 }
 
@@ -76,7 +76,7 @@ struct Three {
 
 // By reference: how wide vectors are passed by value depends on the instruction set.
 template <class Lane>
-TISSUE_SIM_INLINE void subtract(const std::array<WideTree::Row, 3>& corner, std::size_t l, const FloatPoint& p,
+TISSUE_SIM_INLINE void subtract(const std::array<NearTriangles::Row, 3>& corner, std::size_t l, const FloatPoint& p,
                                 Three<Lane>& way) {
   way.x = lane<Lane>(corner[0], l) - p[0];
   way.y = lane<Lane>(corner[1], l) - p[1];
@@ -89,29 +89,7 @@ TISSUE_SIM_INLINE void cross(const Three<Lane>& a, const Three<Lane>& b, Three<L
   product.z = a.x * b.y - a.y * b.x;
 }
 
-/// The triangles of a leaf whose planes the edge p-q may go through: its ends do not surely lie on one side.
-///
-/// Coordinates up to `farthest`, the normal and all sums of their products are rounded: a height is wrong by less than
-/// 16 farthest * rounding.
-template <class Lane>
-TISSUE_SIM_INLINE unsigned straddled(const WideTree::Leaf& leaf, const FloatPoint& p, const FloatPoint& q,
-                                     float farthest) {
-  const float unsure = 32.0F * rounding * farthest;
-  unsigned bits = 0;
-  for (std::size_t l = 0; l < lanes; l += sizeof(Lane) / sizeof(float)) {
-    const Lane& x = lane<Lane>(leaf.normal[0], l);
-    const Lane& y = lane<Lane>(leaf.normal[1], l);
-    const Lane& z = lane<Lane>(leaf.normal[2], l);
-    const Lane height_p = x * p[0] + y * p[1] + z * p[2] - lane<Lane>(leaf.offset, l);
-    const Lane height_q = x * q[0] + y * q[1] + z * q[2] - lane<Lane>(leaf.offset, l);
-    const auto both_above = (height_p > unsure) & (height_q > unsure);
-    const auto both_below = (height_p < -unsure) & (height_q < -unsure);
-    bits |= bits_of(~(both_above | both_below)) << l;
-  }
-  return bits;
-}
-
-/// The triangles of a leaf, of those whose boxes overlap the edge's, whose rims the line p-q does not surely pass on
+/// Of eight packed triangles, from `first` on, whose boxes overlap the edge's: those whose rims the line p-q does not surely pass on
 /// different sides. `within` becomes those of which it surely passes all rims on the same side: farther from them than
 /// what hit_edge_triangle() takes for rounding.
 ///
@@ -119,21 +97,20 @@ TISSUE_SIM_INLINE unsigned straddled(const WideTree::Leaf& leaf, const FloatPoin
 /// rounding each, and what is made of them by less than farthest * length * (54 * along + 24 * length) * rounding,
 /// where `along` bounds the sides of q - p.
 template <class Lane>
-TISSUE_SIM_INLINE unsigned within_rims(const WideTree::Leaf& leaf, const FloatPoint& p, const FloatPoint& q,
-                                       float farthest, unsigned& within) {
+TISSUE_SIM_INLINE unsigned within_rims(const NearTriangles& near, std::size_t first, const FloatPoint& p,
+                                       const FloatPoint& q, float farthest, unsigned& within) {
   const float x = q[0] - p[0];
   const float y = q[1] - p[1];
   const float z = q[2] - p[2];
   const float along = std::max(std::abs(x), std::max(std::abs(y), std::abs(z)));
-  const float length = along + leaf.extent;
-  const float unsure = rounding * farthest * length * (128.0F * along + 64.0F * length);
+  const float unsure = unsure_side(farthest, along, near.extent);
   unsigned bits = 0;
   unsigned bits_within = 0;
   for (std::size_t l = 0; l < lanes; l += sizeof(Lane) / sizeof(float)) {
     Three<Lane> a, b, c, ab, bc, ca;
-    subtract(leaf.corners[0], l, p, a);
-    subtract(leaf.corners[1], l, p, b);
-    subtract(leaf.corners[2], l, p, c);
+    subtract(near.corners[0], first + l, p, a);
+    subtract(near.corners[1], first + l, p, b);
+    subtract(near.corners[2], first + l, p, c);
     cross(a, b, ab);
     cross(b, c, bc);
     cross(c, a, ca);
@@ -163,7 +140,7 @@ TISSUE_SIM_INLINE void for_each_leaf(const WideTree& tree, const FloatPoint& low
     for (unsigned bits = overlapping<Lane>(node, lower, upper); bits != 0; bits &= bits - 1) {
       const auto l = static_cast<std::size_t>(__builtin_ctz(bits));
       const int child = node.child[l];
-      if (tree.nodes[static_cast<std::size_t>(child)].leaf >= 0) {
+      if ((node.leaf_children >> l & 1U) != 0) {
         visit(node, l);
       } else {
         stack.push_back(child);
@@ -172,136 +149,291 @@ TISSUE_SIM_INLINE void for_each_leaf(const WideTree& tree, const FloatPoint& low
   }
 }
 
-/// No number is on either side of a NaN: an edge that reaches to infinity overlaps every box with sides.
+/// No number is on either side of a NaN: a point that is at infinity is not beside it.
 void clear(WideTree::Node& node) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     node.lower[axis].fill(std::numeric_limits<float>::quiet_NaN());
     node.upper[axis].fill(std::numeric_limits<float>::quiet_NaN());
   }
   node.child.fill(-1);
+  node.children = 0;
+  node.leaf_children = 0;
 }
 
-/// Boxes of the leaves near to all the edges. False: there are too many of them.
+/// Lists the leaves near to a box.
 template <class Lane>
-TISSUE_SIM_INLINE bool gather_leaves(const WideTree& tree, const FloatPoint& lower, const FloatPoint& upper,
+TISSUE_SIM_INLINE void gather_leaves(const WideTree& tree, const FloatPoint& lower, const FloatPoint& upper,
                                      WideTreeRoom& room) {
   room.leaves.clear();
-  room.near.clear();
-  for_each_leaf<Lane>(tree, lower, upper, room.stack, [&](const WideTree::Node& node, std::size_t from) {
-    const std::size_t to = room.leaves.size() % lanes;
-    if (to == 0) {
-      room.near.emplace_back();
-      clear(room.near.back());
-    }
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      room.near.back().lower[axis][to] = node.lower[axis][from];
-      room.near.back().upper[axis][to] = node.upper[axis][from];
-    }
-    room.near.back().child[to] = node.child[from];
-    room.leaves.push_back(node.child[from]);
-  });
-  return room.leaves.size() <= most_near_leaves;
+  for_each_leaf<Lane>(tree, lower, upper, room.stack,
+                      [&](const WideTree::Node& node, std::size_t l) { room.leaves.push_back(node.child[l]); });
 }
 
-template <class Lane>
-TISSUE_SIM_INLINE void find_pairs(const WideTree& tree, const std::vector<FloatPoint>& points,
-                                  const std::vector<Edge>& edges, const int* chosen, std::size_t count,
-                                  WideTreeRoom& room, std::vector<EdgeTrianglePair>& pairs) {
-  if (room.edges.size() < count) room.edges.resize(count);
-  Four lower = Four{} + infinite;
-  Four upper = Four{} - infinite;
-  for (std::size_t e = 0; e < count; ++e) {
-    const Edge& edge = edges[static_cast<std::size_t>(chosen[e])];
-    const Four p = four(points[static_cast<std::size_t>(edge[0])]);
-    const Four q = four(points[static_cast<std::size_t>(edge[1])]);
-    const Four low = p < q ? p : q;
-    const Four high = p < q ? q : p;
-    lower = low < lower ? low : lower;
-    upper = high > upper ? high : upper;
-    FloatEdge& kept = room.edges[e];
-    four(kept.p) = p;
-    four(kept.q) = q;
-    four(kept.lower) = low;
-    four(kept.upper) = high;
-  }
-  FloatPoint all_lower;
-  FloatPoint all_upper;
-  four(all_lower) = lower;
-  four(all_upper) = upper;
-  const bool few = gather_leaves<Lane>(tree, all_lower, all_upper, room);
-  if (room.leaves.empty()) return;
-  float farthest = tree.farthest;
-  for (std::size_t i = 0; i < 3; ++i) farthest = std::max({farthest, std::abs(all_lower[i]), std::abs(all_upper[i])});
-
-  // In passes, each over what the one before has left, since no one can guess what a test will say: writing down every
-  // visit and counting on only where it is kept takes no branch.
-  std::vector<EdgeLeafVisit>& visits = room.visits;
-  std::size_t kept = 0;
-  for (int e = 0; e < static_cast<int>(count); ++e) {
-    const FloatEdge& edge = room.edges[static_cast<std::size_t>(e)];
-    if (!few) {
-      for_each_leaf<Lane>(tree, edge.lower, edge.upper, room.stack, [&](const WideTree::Node& node, std::size_t l) {
-        if (visits.size() < kept + 1) visits.resize(2 * kept + 64);
-        visits[kept++] = {e, node.child[l], 0, 0};
-      });
-      continue;
-    }
-    if (visits.size() < kept + most_near_leaves) visits.resize(2 * kept + most_near_leaves);
-    for (const WideTree::Node& eight : room.near) {
-      for (unsigned bits = overlapping<Lane>(eight, edge.lower, edge.upper); bits != 0; bits &= bits - 1) {
-        visits[kept++] = {e, eight.child[static_cast<std::size_t>(__builtin_ctz(bits))], 0, 0};
+/// Which lanes to take to the front, for every choice of them.
+struct PackingOrder {
+  std::array<std::array<int, lanes>, 256> of{};
+  constexpr PackingOrder() {
+    for (unsigned chosen = 0; chosen < 256; ++chosen) {
+      std::size_t to = 0;
+      for (unsigned l = 0; l < 8; ++l) {
+        if ((chosen >> l & 1U) != 0) of[chosen][to++] = static_cast<int>(l);
       }
     }
   }
-  const auto keep_if = [&](auto test) __attribute__((always_inline)) {
-    const std::size_t before = kept;
-    kept = 0;
-    for (std::size_t i = 0; i < before; ++i) {
-      EdgeLeafVisit visit = visits[i];
-      visit.triangles = test(visit);
+};
+constexpr PackingOrder packing_order;
+
+/// Writes the chosen lanes of eight one behind the other, and anything behind them.
+template <class Lane, class Number>
+TISSUE_SIM_INLINE void pack_row(const std::array<Number, lanes>& row, unsigned chosen, Number* to) {
+#if defined(__x86_64__) && !defined(__clang__)
+  if (sizeof(Lane) == sizeof(Eight)) {
+    const EightBits& order = reinterpret_cast<const EightBits&>(packing_order.of[chosen]);
+    *reinterpret_cast<Eight*>(to) = __builtin_shuffle(reinterpret_cast<const EightFloats&>(row), order);
+    return;
+  }
+#endif
+  for (; chosen != 0; chosen &= chosen - 1) *to++ = row[static_cast<std::size_t>(__builtin_ctz(chosen))];
+}
+
+/// Packs the triangles of the listed leaves from `from` on whose boxes overlap the box, as many as there is room for.
+/// Returns where in the list to go on.
+template <class Lane>
+TISSUE_SIM_INLINE std::size_t pack_triangles(const WideTree& tree, const FloatPoint& lower, const FloatPoint& upper,
+                                             std::size_t from, WideTreeRoom& room) {
+  NearTriangles& near = room.near;
+  near.count = 0;
+  near.extent = 0.0F;
+  for (; from < room.leaves.size() && near.count + lanes <= NearTriangles::most; ++from) {
+    const WideTree::Node& node = tree.nodes[static_cast<std::size_t>(room.leaves[from])];
+    const unsigned chosen = overlapping<Lane>(node, lower, upper);
+    if (chosen == 0) continue;
+    const WideTree::Leaf& leaf = tree.leaves[static_cast<std::size_t>(node.leaf)];
+    const std::size_t to = near.count;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      pack_row<Lane>(node.lower[axis], chosen, &near.lower[axis][to]);
+      pack_row<Lane>(node.upper[axis], chosen, &near.upper[axis][to]);
+      pack_row<Lane>(leaf.normal[axis], chosen, &near.normal[axis][to]);
+      for (std::size_t corner = 0; corner < 3; ++corner) {
+        pack_row<Lane>(leaf.corners[corner][axis], chosen, &near.corners[corner][axis][to]);
+      }
+    }
+    pack_row<Lane>(leaf.offset, chosen, &near.offset[to]);
+    near.extent = std::max(near.extent, leaf.extent);
+    pack_row<Lane>(node.child, chosen, &near.triangle[to]);
+    near.count += static_cast<std::size_t>(__builtin_popcount(chosen));
+  }
+  return from;
+}
+
+using FourWords = std::uint64_t __attribute__((vector_size(32)));
+static_assert(sizeof(PointCodes) == 2 * sizeof(FourWords), "eight kinds of a word each");
+
+template <std::size_t bytes>
+struct LaneOf {
+  typedef Four Type;  // NOLINT(modernize-use-using): its attributes count
+};
+template <>
+struct LaneOf<32> {
+  typedef Eight Type;  // NOLINT(modernize-use-using)
+};
+
+/// What is done with packed triangles, in registers of so many bytes; packed_triangles.h says what.
+template <std::size_t bytes>
+struct PackedIn {
+  typedef typename LaneOf<bytes>::Type Lane;  // NOLINT(modernize-use-using)
+  static constexpr std::size_t group = lanes;
+
+  static TISSUE_SIM_INLINE void code_points(const NearTriangles& near, std::size_t first, std::size_t count,
+                                            const NearEdges& edges, float farthest, PointCodes* codes) {
+    constexpr std::size_t width = bytes / sizeof(float);
+    constexpr unsigned all = (1U << width) - 1;
+    const float unsure = unsure_height(farthest);
+    for (std::size_t group = 0; group < count; group += width) {
+      // Copies, since a byte that is written might be anybody's.
+      Lane lower[3], upper[3], normal[3];
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        lower[axis] = lane<Lane>(near.lower[axis], first + group);
+        upper[axis] = lane<Lane>(near.upper[axis], first + group);
+        normal[axis] = lane<Lane>(near.normal[axis], first + group);
+      }
+      const Lane offset = lane<Lane>(near.offset, first + group);
+      const std::size_t shift = width < lanes ? group % lanes : 0;
+      for (std::size_t i = 0; i < edges.point_count; ++i) {
+        const FloatPoint p = edges.points[i];
+        std::array<unsigned, PointCodes::kinds> bits;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          bits[2 * axis] = bits_of(upper[axis] >= p[axis]);
+          bits[2 * axis + 1] = bits_of(lower[axis] <= p[axis]);
+        }
+        const Lane height = normal[0] * p[0] + normal[1] * p[1] + normal[2] * p[2] - offset;
+        bits[PointCodes::not_in_front] = all & ~bits_of(height > unsure);  // also where it is not a number
+        bits[PointCodes::not_behind] = all & ~bits_of(height < -unsure);
+        for (std::size_t kind = 0; kind < PointCodes::kinds; ++kind) {
+          unsigned char& byte = codes[i].bytes[kind][group / lanes];
+          byte = static_cast<unsigned char>(bits[kind] << shift | (shift != 0 ? byte : 0U));
+        }
+      }
+    }
+  }
+
+  static TISSUE_SIM_INLINE void find_candidates(const NearEdges& edges, const PointCodes* codes, std::uint64_t all,
+                                                std::size_t step, std::uint64_t* candidates) {
+    for (std::size_t e = 0; e < edges.count; ++e) {
+      std::array<FourWords, 2> p, q;
+      std::memcpy(&p, codes + edges.ends[e][0], sizeof p);
+      std::memcpy(&q, codes + edges.ends[e][1], sizeof q);
+      const FourWords kept = (p[0] | q[0]) & (p[1] | q[1]);
+      candidates[e * step] = all & kept[0] & kept[1] & kept[2] & kept[3];
+    }
+  }
+
+  static TISSUE_SIM_INLINE std::size_t keep_within_rims(const NearTriangles& near, const NearEdges& edges,
+                                                        float farthest, EdgeVisit* visits, std::size_t count) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      EdgeVisit visit = visits[i];
+      const Edge& ends = edges.ends[visit.edge];
+      visit.triangles &= within_rims<Lane>(near, static_cast<std::size_t>(visit.first), edges.points[ends[0]],
+                                           edges.points[ends[1]], farthest, visit.within_rims);
       visits[kept] = visit;
       kept += visit.triangles != 0 ? 1 : 0;
     }
-  };
-  keep_if([&](EdgeLeafVisit & visit) __attribute__((always_inline)) {
-    const FloatEdge& edge = room.edges[static_cast<std::size_t>(visit.edge)];
-    const WideTree::Node& leaf = tree.nodes[static_cast<std::size_t>(visit.leaf)];
-    return overlapping<Lane>(leaf, edge.lower, edge.upper) &
-           straddled<Lane>(tree.leaves[static_cast<std::size_t>(leaf.leaf)], edge.p, edge.q, farthest);
-  });
-  keep_if([&](EdgeLeafVisit & visit) __attribute__((always_inline)) {
-    const FloatEdge& edge = room.edges[static_cast<std::size_t>(visit.edge)];
-    const WideTree::Node& leaf = tree.nodes[static_cast<std::size_t>(visit.leaf)];
-    return visit.triangles & within_rims<Lane>(tree.leaves[static_cast<std::size_t>(leaf.leaf)], edge.p, edge.q,
-                                               farthest, visit.within_rims);
-  });
+    return kept;
+  }
+};
+
+#ifdef __x86_64__
+struct PackedInAvx512 {
+  static constexpr std::size_t group = 16;
+  static constexpr auto code_points = code_points_avx512;
+  static constexpr auto find_candidates = find_candidates_avx512;
+  static constexpr auto keep_within_rims = keep_within_rims_avx512;
+};
+#endif
+
+/// Appends the pairs of the edges and the packed triangles that may cross.
+///
+/// An edge shares its ends with others, so boxes and planes are compared with the ends, and the edges put together what
+/// is known of theirs. In passes, each over what the one before has left, since no one can guess what a test will say:
+/// writing down every visit and counting on only where it is kept takes no branch.
+template <class Packed>
+TISSUE_SIM_INLINE void test_packed(const NearEdges& edges, float farthest, WideTreeRoom& room,
+                                   std::vector<EdgeTrianglePair>& pairs) {
+  const NearTriangles& near = room.near;
+  const std::size_t words = (near.count + in_word - 1) / in_word;
+  if (room.codes.size() < edges.point_count) room.codes.resize(edges.point_count);
+  if (room.candidates.size() < words * edges.count) room.candidates.resize(words * edges.count);
+  for (std::size_t word = 0; word < words; ++word) {
+    const std::size_t first = word * in_word;
+    const std::size_t count = std::min(in_word, near.count - first);
+    Packed::code_points(near, first, count, edges, farthest, room.codes.data());
+    const std::uint64_t all = ~std::uint64_t{0} >> (in_word - count);
+    Packed::find_candidates(edges, room.codes.data(), all, words, room.candidates.data() + word);
+  }
+
+  constexpr std::size_t group = Packed::group;
+  constexpr std::uint64_t of_group = (std::uint64_t{1} << group) - 1;
+  std::vector<EdgeVisit>& visits = room.visits;
+  const std::size_t most_visits = edges.count * words * (in_word / group);
+  if (visits.size() < most_visits) visits.resize(most_visits);
+  std::size_t kept = 0;
+  for (std::size_t e = 0; e < edges.count; ++e) {
+    for (std::size_t word = 0; word < words; ++word) {
+      const std::uint64_t candidates = room.candidates[e * words + word];
+      const std::size_t count = std::min(in_word, near.count - in_word * word);
+      for (std::size_t at = 0; at < count; at += group) {
+        const auto triangles = static_cast<unsigned>((candidates >> at) & of_group);
+        visits[kept] = {static_cast<int>(e), static_cast<int>(in_word * word + at), triangles, 0};
+        kept += triangles != 0 ? 1 : 0;
+      }
+    }
+  }
+  kept = Packed::keep_within_rims(near, edges, farthest, visits.data(), kept);
+  std::size_t found = pairs.size();
+  std::size_t more = 0;
+  for (std::size_t i = 0; i < kept; ++i) more += static_cast<std::size_t>(__builtin_popcount(visits[i].triangles));
+  pairs.resize(found + more);
   for (std::size_t i = 0; i < kept; ++i) {
-    const WideTree::Node& leaf = tree.nodes[static_cast<std::size_t>(visits[i].leaf)];
-    for (unsigned bits = visits[i].triangles; bits != 0; bits &= bits - 1) {
-      pairs.push_back({chosen[visits[i].edge], leaf.child[static_cast<std::size_t>(__builtin_ctz(bits))],
-                       (visits[i].within_rims & bits & -bits) != 0});
+    const EdgeVisit& visit = visits[i];
+    for (unsigned bits = visit.triangles; bits != 0; bits &= bits - 1) {
+      EdgeTrianglePair& pair = pairs[found++];  // field by field: a whole one would wait for its parts
+      pair.edge = edges.edges[visit.edge];
+      pair.triangle = near.triangle[static_cast<std::size_t>(visit.first + __builtin_ctz(bits))];
+      pair.within_rims = (visit.within_rims & bits & -bits) != 0;
     }
   }
 }
 
-__attribute__((noinline)) void find_pairs_narrow(const WideTree& tree, const std::vector<FloatPoint>& points,
-                                                 const std::vector<Edge>& edges, const int* chosen, std::size_t count,
-                                                 WideTreeRoom& room, std::vector<EdgeTrianglePair>& pairs) {
-  find_pairs<Four>(tree, points, edges, chosen, count, room, pairs);
+/// Their box, and the largest coordinate in it and the tree.
+TISSUE_SIM_INLINE float bounds_of(const WideTree& tree, const NearEdges& edges, FloatPoint& lower, FloatPoint& upper) {
+  Four low = Four{} + infinite;
+  Four high = Four{} - infinite;
+  for (std::size_t i = 0; i < edges.point_count; ++i) {
+    const Four p = four(edges.points[i]);
+    low = p < low ? p : low;
+    high = p > high ? p : high;
+  }
+  four(lower) = low;
+  four(upper) = high;
+  float farthest = tree.farthest;
+  for (std::size_t i = 0; i < 3; ++i) farthest = std::max({farthest, std::abs(lower[i]), std::abs(upper[i])});
+  return farthest;
+}
+
+template <class Lane, class Packed>
+TISSUE_SIM_INLINE void find_pairs(const WideTree& tree, const NearEdges& edges, WideTreeRoom& room,
+                                  std::vector<EdgeTrianglePair>& pairs) {
+  FloatPoint lower;
+  FloatPoint upper;
+  const float farthest = bounds_of(tree, edges, lower, upper);
+  gather_leaves<Lane>(tree, lower, upper, room);
+  if (room.leaves.empty()) return;
+  if (pack_triangles<Lane>(tree, lower, upper, 0, room) == room.leaves.size()) {
+    return test_packed<Packed>(edges, farthest, room, pairs);
+  }
+  // Too many at once: each edge goes down the tree by itself.
+  for (std::size_t e = 0; e < edges.count; ++e) {
+    const std::array<FloatPoint, 2> ends = {edges.points[edges.ends[e][0]], edges.points[edges.ends[e][1]]};
+    constexpr Edge both = {0, 1};
+    const NearEdges one = {ends.data(), 2, &both, edges.edges + e, 1};
+    bounds_of(tree, one, lower, upper);
+    gather_leaves<Lane>(tree, lower, upper, room);
+    for (std::size_t from = 0; from < room.leaves.size();) {
+      from = pack_triangles<Lane>(tree, lower, upper, from, room);
+      test_packed<Packed>(one, farthest, room, pairs);
+    }
+  }
+}
+
+__attribute__((noinline)) void find_pairs_narrow(const WideTree& tree, const NearEdges& edges, WideTreeRoom& room,
+                                                 std::vector<EdgeTrianglePair>& pairs) {
+  find_pairs<Four, PackedIn<16>>(tree, edges, room, pairs);
 }
 #ifdef __x86_64__
-__attribute__((target("avx2"))) void find_pairs_wide(const WideTree& tree, const std::vector<FloatPoint>& points,
-                                                     const std::vector<Edge>& edges, const int* chosen,
-                                                     std::size_t count, WideTreeRoom& room,
+__attribute__((target("avx2"))) void find_pairs_wide(const WideTree& tree, const NearEdges& edges, WideTreeRoom& room,
                                                      std::vector<EdgeTrianglePair>& pairs) {
-  find_pairs<Eight>(tree, points, edges, chosen, count, room, pairs);
+  find_pairs<Eight, PackedIn<32>>(tree, edges, room, pairs);
+}
+__attribute__((target("avx2"))) void find_pairs_widest(const WideTree& tree, const NearEdges& edges, WideTreeRoom& room,
+                                                       std::vector<EdgeTrianglePair>& pairs) {
+  find_pairs<Eight, PackedInAvx512>(tree, edges, room, pairs);
 }
 #endif
 
-/// Squared distances from p to the children's boxes, or a little less; see closest().
+/// A float that is no smaller. Where only infinity is, no distance is too far, not even one that is too large for a float.
+TISSUE_SIM_INLINE float rounded_up(double value) {
+  constexpr double largest = std::numeric_limits<float>::max();
+  constexpr double smallest = std::numeric_limits<float>::min();
+  return value < (1.0 - 1e-6) * largest ? static_cast<float>(value * (1.0 + 1e-6) + smallest) : infinite;
+}
+
+/// Squared distances from p to the children's boxes, or a little less; see closest(). Returns a bit for each child that
+/// is no farther than `limit`.
 template <class Lane>
-TISSUE_SIM_INLINE void squared_distances(const WideTree::Node& node, const FloatPoint& p, float slack,
-                                         WideTree::Row& distances) {
+TISSUE_SIM_INLINE unsigned squared_distances(const WideTree::Node& node, const FloatPoint& p, float slack, float limit,
+                                             WideTree::Row& distances) {
+  unsigned near = 0;
   for (std::size_t l = 0; l < lanes; l += sizeof(Lane) / sizeof(float)) {
     Lane sum{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -311,16 +443,38 @@ TISSUE_SIM_INLINE void squared_distances(const WideTree::Node& node, const Float
       way = way > 0.0F ? way : Lane{};
       sum += way * way;
     }
-    *reinterpret_cast<Lane*>(distances.data() + l) = sum * (1.0F - 1e-6F);
+    sum *= 1.0F - 1e-6F;
+    *reinterpret_cast<Lane*>(distances.data() + l) = sum;
+    near |= bits_of(sum <= limit) << l;
   }
+  return near & ((1U << static_cast<unsigned>(node.children)) - 1U);
 }
 
-/// Nearest first. A coordinate is rounded by at most (its size) * rounding, a difference once more: `slack` is more
-/// than all of it.
-/// `near_enough(distance)` says by a squared distance whether what is no nearer has still to be looked at.
-template <class Lane, class NearEnough>
-TISSUE_SIM_INLINE void closest(const WideTree& tree, const Vector3& from, ClosestSearch& search,
-                               NearEnough&& near_enough) {
+/// Raises the distances of a leaf's triangles to those of their planes, and takes away the bits of what is then farther
+/// than `limit`: around a point on a curved surface the boxes of all neighbours have it, and their planes do not.
+template <class Lane>
+TISSUE_SIM_INLINE unsigned plane_distances(const WideTree::Leaf& leaf, const FloatPoint& p, float slack, float limit,
+                                           WideTree::Row& distances) {
+  unsigned near = 0;
+  for (std::size_t l = 0; l < lanes; l += sizeof(Lane) / sizeof(float)) {
+    const Lane height = lane<Lane>(leaf.normal[0], l) * p[0] + lane<Lane>(leaf.normal[1], l) * p[1] +
+                        lane<Lane>(leaf.normal[2], l) * p[2] - lane<Lane>(leaf.offset, l);
+    Lane way = (height > 0.0F ? height : -height) - slack;
+    way = way > 0.0F ? way : Lane{};
+    const Lane of_box = lane<Lane>(distances, l);
+    const Lane of_plane = way * way * (1.0F - 1e-6F);
+    const Lane farther = of_plane > of_box ? of_plane : of_box;
+    *reinterpret_cast<Lane*>(distances.data() + l) = farther;
+    near |= bits_of(farther <= limit) << l;
+  }
+  return near;
+}
+
+/// Nearest first. A coordinate is rounded by at most (its size) * rounding, a difference once more, and a height as
+/// straddled() says: `slack` and `slack_of_plane` are more than all of it.
+/// What is at a squared distance of more than `limit()` need not be looked at, as far as is known now.
+template <class Lane, class Limit>
+TISSUE_SIM_INLINE void closest(const WideTree& tree, const Vector3& from, ClosestSearch& search, Limit&& limit) {
   struct Entry {
     int child;
     float distance;
@@ -329,37 +483,40 @@ TISSUE_SIM_INLINE void closest(const WideTree& tree, const Vector3& from, Closes
   const FloatPoint p = to_float(from);
   const float size = tree.farthest + std::max({std::abs(p[0]), std::abs(p[1]), std::abs(p[2])});
   const float slack = 8.0F * rounding * size;
+  const float slack_of_plane = 32.0F * rounding * size;
+  float enough = rounded_up(limit());
   std::size_t waiting = 1;
   stack[0] = {0, 0.0F};
   while (waiting > 0) {
     const Entry entry = stack[--waiting];
-    if (!near_enough(entry.distance)) continue;
+    if (!(entry.distance <= enough)) continue;
     const WideTree::Node& node = tree.nodes[static_cast<std::size_t>(entry.child)];
     alignas(32) WideTree::Row distances;
-    squared_distances<Lane>(node, p, slack, distances);
+    unsigned near = squared_distances<Lane>(node, p, slack, enough, distances);
+    if (node.leaf >= 0) {
+      near &= plane_distances<Lane>(tree.leaves[static_cast<std::size_t>(node.leaf)], p, slack_of_plane, enough,
+                                    distances);
+    }
     const std::size_t bottom = waiting;
-    for (std::size_t l = 0; l < lanes && node.child[l] >= 0; ++l) {
-      if (!near_enough(distances[l])) continue;
+    for (; near != 0; near &= near - 1) {
+      const auto l = static_cast<std::size_t>(__builtin_ctz(near));
       std::size_t at = waiting++;
       for (; at > bottom && stack[at - 1].distance < distances[l]; --at) stack[at] = stack[at - 1];
       stack[at] = {node.child[l], distances[l]};
     }
     if (node.leaf < 0) continue;
     for (; waiting > bottom; --waiting) {
-      if (near_enough(stack[waiting - 1].distance)) search.look_at(stack[waiting - 1].child);
+      if (!(stack[waiting - 1].distance <= enough)) continue;
+      search.look_at(stack[waiting - 1].child);
+      enough = rounded_up(limit());
     }
   }
-}
-
-TISSUE_SIM_INLINE bool within(float squared_distance, double bound) {
-  return static_cast<double>(std::min(squared_distance, std::numeric_limits<float>::max())) <= bound;
 }
 
 template <class Lane>
 TISSUE_SIM_INLINE void closest(const WideTree& tree, const Vector3& from, ClosestSearch& search) {
   closest<Lane>(
-      tree, from,
-      search, [&](float distance) __attribute__((always_inline)) { return within(distance, search.bound); });
+      tree, from, search, [&]() __attribute__((always_inline)) { return search.bound; });
 }
 __attribute__((noinline)) void closest_narrow(const WideTree& tree, const Vector3& from, ClosestSearch& search) {
   closest<Four>(tree, from, search);
@@ -387,9 +544,7 @@ template <class Lane>
 TISSUE_SIM_INLINE void free_ball(const WideTree& tree, const Vector3& from, const Wanted& wanted,
                                  ClosestSearch& search) {
   closest<Lane>(
-      tree, from, search, [&](float distance) __attribute__((always_inline)) {
-        return within(distance, wanted.free_within(search.bound));
-      });
+      tree, from, search, [&]() __attribute__((always_inline)) { return wanted.free_within(search.bound); });
 }
 __attribute__((noinline)) void free_ball_narrow(const WideTree& tree, const Vector3& from, const Wanted& wanted,
                                                 ClosestSearch& search) {
@@ -449,6 +604,9 @@ struct Builder {
       const Box of_part =
           build_node(children + part, first + starts[part], starts[part + 1] - starts[part], height + 1);
       set_lane(index, static_cast<std::size_t>(part), of_part, children + part);
+      if (tree.nodes[static_cast<std::size_t>(children + part)].leaf >= 0) {
+        tree.nodes[static_cast<std::size_t>(index)].leaf_children |= 1U << static_cast<unsigned>(part);
+      }
       box.add(of_part);
     }
     return box;
@@ -486,7 +644,7 @@ struct Builder {
         }
       }
       const auto& [a, b, c] = triangles[triangle];
-      const Vector3 normal = area_normal(vertices[a], vertices[b], vertices[c]).stableNormalized();
+      const Vector3 normal = plane_normal(vertices[a], vertices[b], vertices[c]);
       const FloatPoint rounded = to_float(normal);
       for (std::size_t axis = 0; axis < 3; ++axis) leaf.normal[axis][l] = rounded[axis];
       leaf.offset[l] = static_cast<float>(normal.dot(vertices[a]));
@@ -498,6 +656,14 @@ struct Builder {
     return box;
   }
 
+  /// Zero also where rounding leaves so little of a sliver's plane that its corners are not on it.
+  static Vector3 plane_normal(const Vector3& a, const Vector3& b, const Vector3& c) {
+    const Vector3 normal = area_normal(a, b, c).stableNormalized();
+    const double size = std::max({a.lpNorm<Eigen::Infinity>(), b.lpNorm<Eigen::Infinity>(), c.lpNorm<Eigen::Infinity>()});
+    const double off = std::max(std::abs(normal.dot(b - a)), std::abs(normal.dot(c - a)));
+    return off <= static_cast<double>(rounding) * size ? normal : Vector3(Vector3::Zero());
+  }
+
   void set_lane(int index, std::size_t l, const Box& box, int child) {
     WideTree::Node& node = tree.nodes[static_cast<std::size_t>(index)];
     for (int axis = 0; axis < 3; ++axis) {
@@ -505,6 +671,7 @@ struct Builder {
       node.upper[static_cast<std::size_t>(axis)][l] = static_cast<float>(box.upper[axis]);
     }
     node.child[l] = child;
+    node.children = std::max(node.children, static_cast<int>(l) + 1);
   }
 };
 
@@ -513,12 +680,19 @@ struct Builder {
 bool available(Registers registers) {
 #ifdef __x86_64__
   if (registers == Registers::wide) return __builtin_cpu_supports("avx2") != 0;
+  if (registers == Registers::widest) {
+    return available(Registers::wide) && __builtin_cpu_supports("avx512f") != 0 &&
+           __builtin_cpu_supports("avx512bw") != 0 && __builtin_cpu_supports("avx512dq") != 0 &&
+           __builtin_cpu_supports("avx512vl") != 0;
+  }
 #endif
   return registers == Registers::narrow;
 }
 
 Registers widest_registers() {
-  static const Registers widest = available(Registers::wide) ? Registers::wide : Registers::narrow;
+  static const Registers widest = available(Registers::widest) ? Registers::widest
+                                  : available(Registers::wide) ? Registers::wide
+                                                               : Registers::narrow;
   return widest;
 }
 
@@ -533,13 +707,13 @@ WideTree build_wide_tree(const std::vector<Vector3>& vertices, const std::vector
   return tree;
 }
 
-void find_crossing_pairs(const WideTree& tree, const std::vector<FloatPoint>& points, const std::vector<Edge>& edges,
-                         const int* chosen, std::size_t count, WideTreeRoom& room, std::vector<EdgeTrianglePair>& pairs,
-                         Registers registers) {
+void find_crossing_pairs(const WideTree& tree, const NearEdges& edges, WideTreeRoom& room,
+                         std::vector<EdgeTrianglePair>& pairs, Registers registers) {
 #ifdef __x86_64__
-  if (registers == Registers::wide) return find_pairs_wide(tree, points, edges, chosen, count, room, pairs);
+  if (registers == Registers::widest) return find_pairs_widest(tree, edges, room, pairs);
+  if (registers == Registers::wide) return find_pairs_wide(tree, edges, room, pairs);
 #endif
-  find_pairs_narrow(tree, points, edges, chosen, count, room, pairs);
+  find_pairs_narrow(tree, edges, room, pairs);
 }
 
 ClosestOnMesh closest_on_mesh(const std::vector<Vector3>& vertices, const std::vector<Triangle>& triangles,
@@ -548,7 +722,7 @@ ClosestOnMesh closest_on_mesh(const std::vector<Vector3>& vertices, const std::v
   if (!p.allFinite()) return search.best;
   if (guess >= 0) search.look_at(guess);
 #ifdef __x86_64__
-  if (registers == Registers::wide) {
+  if (registers != Registers::narrow) {
     closest_wide(tree, p, search);
     return search.best;
   }
@@ -565,7 +739,7 @@ ClosestOnMesh free_around(const std::vector<Vector3>& vertices, const std::vecto
   if (guess >= 0) search.look_at(guess);
   const Wanted wanted = {little * little, enough * enough};
 #ifdef __x86_64__
-  if (registers == Registers::wide) {
+  if (registers != Registers::narrow) {
     free_ball_wide(tree, p, wanted, search);
   } else
 #endif

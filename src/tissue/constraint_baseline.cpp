@@ -44,6 +44,16 @@ TISSUE_SIM_INLINE void to_quads(const Three<Lane>& rows, Quad* quads) {
   quads[3] = TISSUE_SIM_SHUFFLE(xy2, zw2, 2, 3, 6, 7);
 }
 
+TISSUE_SIM_INLINE bool any_above(const Lane& x, const Lane& limit) {
+#ifdef __x86_64__
+  return _mm_movemask_ps(_mm_cmpgt_ps(x, limit)) != 0;
+#else
+  bool any = false;
+  for (int l = 0; l < 4; ++l) any = any || x[l] > limit[l];
+  return any;
+#endif
+}
+
 TISSUE_SIM_INLINE void root(const Lane& x, Lane& of_x) {
 #ifdef __x86_64__
   of_x = _mm_sqrt_ps(x);

@@ -48,6 +48,10 @@ TISSUE_SIM_TARGET TISSUE_SIM_INLINE void to_quads(const Three<Lane>& rows, Quad*
   take_two(_mm256_shuffle_ps(xy2, zw2, _MM_SHUFFLE(3, 2, 3, 2)), quads[3], quads[7]);
 }
 
+TISSUE_SIM_TARGET TISSUE_SIM_INLINE bool any_above(const Lane& x, const Lane& limit) {
+  return _mm256_movemask_ps(_mm256_cmp_ps(x, limit, _CMP_GT_OQ)) != 0;
+}
+
 TISSUE_SIM_TARGET TISSUE_SIM_INLINE void root(const Lane& x, Lane& of_x) {
   of_x = _mm256_sqrt_ps(x);
 }

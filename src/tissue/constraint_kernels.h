@@ -6,7 +6,7 @@
 
 /// Distance, area and volume elements side by side, written once for all registers. A source that includes this has
 /// defined before, in this namespace: TISSUE_SIM_TARGET, what to compile for; `Lane`, as many floats as go side by
-/// side; `gather()`, `to_quads()` and `root()` for them.
+/// side; `gather()`, `to_quads()`, `root()` and `any_above()` for them.
 namespace tissue_sim {
 namespace {
 
@@ -53,6 +53,7 @@ TISSUE_SIM_KERNEL void invert(const Lane& p, const Lane& q, Lane& of_p, Lane& of
 
 /// What remains of an element's pull where it has become too stiff, see StiffnessLimit: 1 for most.
 TISSUE_SIM_KERNEL Lane softened(const Lane& squared_frequency, const Lane& stiffest) {
+  if (!any_above(squared_frequency, stiffest)) return Lane{} + 1.0F;  // what the division would give
   return stiffest / (squared_frequency > stiffest ? squared_frequency : stiffest);
 }
 

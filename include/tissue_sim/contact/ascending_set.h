@@ -19,7 +19,10 @@ class AscendingSet {
   void add(int number) {
     auto n = static_cast<std::uint64_t>(number);
     for (std::vector<std::uint64_t>& level : levels_) {
-      level[n / 64] |= std::uint64_t{1} << (n % 64);
+      std::uint64_t& word = level[n / 64];
+      const bool known_above = word != 0;
+      word |= std::uint64_t{1} << (n % 64);
+      if (known_above) return;
       n /= 64;
     }
   }

@@ -36,6 +36,15 @@ struct FreeBall {
   int triangle = -1;
 };
 
+/// An edge that goes through the plane of a triangle.
+struct PlaneHit {
+  int edge = 0;
+  int triangle = 0;
+  double t = 0.0;
+  int direction = 0;
+  bool within_rims = false;  ///< surely, as in EdgeTrianglePair
+};
+
 /// What stage 1 finds between one organ and one piece of an instrument. Reused from step to step: nothing is allocated
 /// once it has been as large as it needs. To be prepared anew for another organ or piece.
 struct Detection {
@@ -55,8 +64,9 @@ struct Detection {
   std::vector<int> nearest;  ///< per vertex: the triangle of the instrument found last, or -1; a guess for the next
                              ///< search, which makes it shorter and changes nothing else
   std::vector<FreeBall> free_balls;       ///< per patch: around where its middle was when that was last asked for
-  std::vector<FloatPoint> local_rounded;  ///< of `local`
-  std::vector<EdgeTrianglePair> pairs;    ///< that may cross
+  std::vector<FloatPoint> rounded;      ///< of `local`, those of the ends of a patch's edges
+  std::vector<EdgeTrianglePair> pairs;  ///< that may cross
+  std::vector<PlaneHit> hits;           ///< of these: where the plane is crossed
   WideTreeRoom tree_room;
   AscendingSet edge_set;
   AscendingSet vertex_set;

@@ -24,6 +24,8 @@ struct SurfacePatches {
   FlatLists triangles;        ///< of each patch, ascending
   FlatLists vertices;         ///< of each patch, ascending: all corners of its triangles
   FlatLists edges;            ///< of each patch, ascending: every edge of the organ is in one patch only
+  FlatLists edge_vertices;    ///< of each patch, ascending: the ends of its edges
+  std::vector<Edge> ends;     ///< of each entry of edges.items: where the edge's ends are in the patch's edge_vertices
   std::vector<int> patch_of;  ///< per vertex: one of the patches that have it
   std::vector<int> leaf_of;   ///< per patch, into nodes
   std::vector<Node> nodes;    ///< depth first: every child stands after its parent

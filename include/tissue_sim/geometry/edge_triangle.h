@@ -7,7 +7,7 @@ namespace tissue_sim {
 /// Where an edge goes through a triangle.
 struct EdgeTriangleHit {
   int direction = 0;  ///< 0: no hit; +1: the edge runs along the normal, from behind to the front; -1: against it
-  double t = 0.0;     ///< along the edge, 0 at p and 1 at q
+  double t = 0.0;     ///< along the edge, 0 at p and 1 at q; of a hit only
 };
 
 /// Does the edge p-q go through the triangle (corners `points`, which are vertices `indices` of their mesh)?
@@ -19,8 +19,19 @@ struct EdgeTriangleHit {
 EdgeTriangleHit hit_edge_triangle(const Vector3& p, const Vector3& q, const std::array<const Vector3*, 3>& points,
                                   const Triangle& indices);
 
-/// The same, to the same bits, where the line through p and q is known to pass all rims of a triangle on one side, by
-/// more than rounding: then its plane decides, given by a corner and area_normal().
-EdgeTriangleHit hit_within_rims(const Vector3& p, const Vector3& q, const Vector3& corner, const Vector3& normal);
+/// Where the edge goes through the triangle's plane, given by a corner and area_normal(): what of the same is decided
+/// by it. Without a branch: no one can guess it.
+inline EdgeTriangleHit hit_plane(const Vector3& p, const Vector3& q, const Vector3& corner, const Vector3& normal) {
+  const double height_p = normal.dot(p - corner);
+  const double height_q = normal.dot(q - corner);
+  const double t = height_p / (height_p - height_q);
+  const int hits = static_cast<int>((height_p < 0.0) != (height_q < 0.0)) & static_cast<int>(t >= 0.0) &
+                   static_cast<int>(t <= 1.0);
+  return {hits * (2 * static_cast<int>(height_p < 0.0) - 1), t};
+}
+
+/// And what is decided by the rims: whether the line through p and q passes all of them on one side.
+bool passes_within_rims(const Vector3& p, const Vector3& q, const std::array<const Vector3*, 3>& points,
+                        const Triangle& indices);
 
 }  // namespace tissue_sim

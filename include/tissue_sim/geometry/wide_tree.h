@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "tissue_sim/geometry/closest_point.h"
@@ -9,8 +10,8 @@
 namespace tissue_sim {
 
 /// Which registers the boxes are compared in: 16 bytes wide, which every x86-64 has (and other processors by the
-/// compiler's own means), or 32. Which pairs come out of a query depends on neither.
-enum class Registers { narrow, wide };
+/// compiler's own means), 32, or, with packed triangles, 64. Which pairs come out of a query depends on none of them.
+enum class Registers { narrow, wide, widest };
 
 /// Whether this build has code for it and this processor can run it. `narrow` always is.
 bool available(Registers registers);
@@ -34,13 +35,15 @@ struct WideTree {
     std::array<Row, 3> lower;
     std::array<Row, 3> upper;
     std::array<int, lanes> child;
-    int leaf = -1;  ///< into leaves, or -1
+    int leaf = -1;     ///< into leaves, or -1
+    int children = 0;  ///< in the first lanes
+    unsigned leaf_children = 0;  ///< which of them are leaves, a bit each: saves a look at them
   };
 
   /// The corners of a leaf's triangles, lane by lane; free lanes repeat the last triangle.
   struct alignas(32) Leaf {
     std::array<std::array<Row, 3>, 3> corners;  ///< corner, axis
-    std::array<Row, 3> normal;                  ///< unit, or zero where the triangle is degenerate
+    std::array<Row, 3> normal;                  ///< unit, or zero where the triangle has no sure plane
     Row offset;                                 ///< m, of the plane: normal . corner
     float extent = 0.0F;                        ///< m, the longest side of the box of any of them
   };
@@ -60,35 +63,59 @@ struct EdgeTrianglePair {
   bool within_rims = false;  ///< of the triangle, runs the line of the edge, surely: see hit_within_rims
 };
 
-/// An edge near to a leaf: numbers among those that are chosen, and among the nodes.
-struct EdgeLeafVisit {
-  int edge = 0;
-  int leaf = 0;
-  unsigned triangles = 0;    ///< lanes of the leaf, a bit each
-  unsigned within_rims = 0;  ///< of these: surely, as in EdgeTrianglePair
+/// Edges that run near to each other, such as those of a patch. Borrowed for the length of a call.
+struct NearEdges {
+  const FloatPoint* points;  ///< their ends, rounded, in the tree's frame
+  std::size_t point_count;
+  const Edge* ends;  ///< of each edge, into points
+  const int* edges;  ///< what each is called
+  std::size_t count;
 };
 
-/// The ends of an edge and its box.
-struct FloatEdge {
-  FloatPoint p, q, lower, upper;
+/// Triangles near to some edges, packed side by side.
+struct alignas(64) NearTriangles {
+  static constexpr std::size_t most = 256;
+  using Row = std::array<float, most + 16>;  ///< as many as a register has are written and read where the last begin
+
+  std::array<Row, 3> lower, upper, normal;  ///< as WideTree::Node and Leaf
+  Row offset;
+  std::array<std::array<Row, 3>, 3> corners;  ///< corner, axis
+  std::array<int, most> triangle;
+  std::size_t count = 0;
+  float extent = 0.0F;  ///< m, the longest side of the box of any of them
+};
+
+/// Where a point is to 64 packed triangles, a bit each, eight a byte. An edge can be dropped for a triangle when there
+/// is one of these that neither of its ends has: both are then outside the same side of the box, or on the same side
+/// of the plane.
+struct PointCodes {
+  enum Kind : std::size_t { x_below_upper, x_above_lower, y_below_upper, y_above_lower, z_below_upper, z_above_lower,
+                            not_in_front, not_behind, kinds };
+  std::array<std::array<unsigned char, 8>, kinds> bytes;
+};
+
+/// An edge and eight packed triangles.
+struct EdgeVisit {
+  int edge = 0;   ///< into NearEdges
+  int first = 0;  ///< into NearTriangles
+  unsigned triangles = 0;    ///< that the edge may cross, a bit each
+  unsigned within_rims = 0;  ///< of these: surely, as in EdgeTrianglePair
 };
 
 /// Room for queries. Nothing is allocated once it has been as large as it needs.
 struct WideTreeRoom {
   std::vector<int> stack;
-  std::vector<int> leaves;           ///< nodes that are leaves
-  std::vector<WideTree::Node> near;  ///< boxes of `leaves`, eight a node
-  std::vector<FloatEdge> edges;      ///< that are chosen
-  std::vector<EdgeLeafVisit> visits;
+  std::vector<int> leaves;  ///< nodes that are leaves
+  NearTriangles near;
+  std::vector<PointCodes> codes;           ///< one a point
+  std::vector<std::uint64_t> candidates;   ///< per edge: the packed triangles that its ends do not rule out
+  std::vector<EdgeVisit> visits;
 };
 
-/// Appends the pairs of edges that run near to each other (such as those of a patch) and triangles of the tree that may
-/// cross: every pair that does (see hit_edge_triangle), few that do not, the pairs of an edge together. `points` has an
-/// entry for every vertex (rounded, in the tree's frame), of which those of the edges are read; `chosen` are the
-/// `count` edges to look at.
-void find_crossing_pairs(const WideTree& tree, const std::vector<FloatPoint>& points, const std::vector<Edge>& edges,
-                         const int* chosen, std::size_t count, WideTreeRoom& room, std::vector<EdgeTrianglePair>& pairs,
-                         Registers registers = widest_registers());
+/// Appends the pairs of edges and triangles of the tree that may cross: every pair that does (see hit_edge_triangle),
+/// few that do not, the pairs of an edge together.
+void find_crossing_pairs(const WideTree& tree, const NearEdges& edges, WideTreeRoom& room,
+                         std::vector<EdgeTrianglePair>& pairs, Registers registers = widest_registers());
 
 /// A ball around p that the surface does not reach into: `squared_distance` is the square of its radius, and `triangle`
 /// one near to p, or -1 where p is not a number. The largest such ball where its radius is between `little` and
