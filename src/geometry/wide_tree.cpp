@@ -172,11 +172,12 @@ TISSUE_SIM_INLINE void for_each_leaf(const WideTree& tree, const FloatPoint& low
   }
 }
 
-/// No number is on either side of a NaN: an edge that reaches to infinity overlaps every box with sides.
+/// Beginning beyond the largest number, where no edge's box ends. NaN would do as well, but to compare it is an invalid
+/// operation, which stops a program with floating-point traps.
 void clear(WideTree::Node& node) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    node.lower[axis].fill(std::numeric_limits<float>::quiet_NaN());
-    node.upper[axis].fill(std::numeric_limits<float>::quiet_NaN());
+    node.lower[axis].fill(infinite);
+    node.upper[axis].fill(-infinite);
   }
   node.child.fill(-1);
 }
@@ -208,6 +209,7 @@ TISSUE_SIM_INLINE void find_pairs(const WideTree& tree, const std::vector<FloatP
                                   const std::vector<Edge>& edges, const int* chosen, std::size_t count,
                                   WideTreeRoom& room, std::vector<EdgeTrianglePair>& pairs) {
   if (room.edges.size() < count) room.edges.resize(count);
+  const Four largest = Four{} + std::numeric_limits<float>::max();
   Four lower = Four{} + infinite;
   Four upper = Four{} - infinite;
   for (std::size_t e = 0; e < count; ++e) {
@@ -215,7 +217,8 @@ TISSUE_SIM_INLINE void find_pairs(const WideTree& tree, const std::vector<FloatP
     const Four p = four(points[static_cast<std::size_t>(edge[0])]);
     const Four q = four(points[static_cast<std::size_t>(edge[1])]);
     const Four low = p < q ? p : q;
-    const Four high = p < q ? q : p;
+    Four high = p < q ? q : p;
+    high = high > largest ? largest : high;  // to infinity it would overlap empty boxes; NaN stays
     lower = low < lower ? low : lower;
     upper = high > upper ? high : upper;
     FloatEdge& kept = room.edges[e];
@@ -560,7 +563,7 @@ ClosestOnMesh closest_on_mesh(const std::vector<Vector3>& vertices, const std::v
 ClosestOnMesh free_around(const std::vector<Vector3>& vertices, const std::vector<Triangle>& triangles,
                           const WideTree& tree, const Vector3& p, double little, double enough, int guess,
                           Registers registers) {
-  ClosestSearch search(vertices, triangles, p, std::numeric_limits<double>::max());
+  ClosestSearch search(vertices, triangles, p, std::numeric_limits<double>::infinity());
   if (!p.allFinite()) return search.best;
   if (guess >= 0) search.look_at(guess);
   const Wanted wanted = {little * little, enough * enough};

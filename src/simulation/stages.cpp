@@ -13,12 +13,16 @@ namespace tissue_sim {
 
 namespace {
 
-/// More cuts than this for one step is a jump, not a motion (60 m/s with 1 ms steps on 2 mm edges): it is not swept.
-constexpr int most_motion_substeps = 300;
+/// More cuts than this in a millisecond is a jump, not a motion: it is not swept. Where cuts are of half a millimetre,
+/// as on edges of 2 mm, that is 300 m/s; with a probe of 1 mm the end of a tool of 0.2 m that turns end over end 100
+/// times a second is still felt. Steps longer than a millisecond have as many more: 5 m/s are 250 mm in 50 ms.
+constexpr int most_cuts = 600;
+constexpr double cuts_period = 0.001;  ///< s
 
-/// m/s. An untouched organ whose fastest vertex is slower goes to sleep: what is left to move is far below a
-/// micrometre.
+/// m/s, and of the organ's size in a second. An untouched organ whose fastest vertex is slower than both goes to sleep:
+/// what is left to move is far below a micrometre, and below a millionth of the size.
 constexpr double sleep_speed = 1e-7;
+constexpr double sleep_rate = 5e-7;
 
 /// Adds the time from here to the end of the scope to a stage of the profile.
 class Lap {
@@ -35,6 +39,21 @@ class Lap {
 
 double angle_between(const Pose& a, const Pose& b) {
   return a.orientation.angularDistance(b.orientation);
+}
+
+/// m. How far a turn from one pose to the other moves a point of the box at most: less than by all of its reach where
+/// the box lies along the axis, as a shaft that spins about itself.
+double way_of_turn(const InstrumentSurface& surface, const Pose& from, const Pose& to) {
+  const Eigen::AngleAxisd turn(from.orientation.conjugate() * to.orientation);
+  double farthest = 0.0;
+  for (int corner = 0; corner < 8; ++corner) {
+    Vector3 p;
+    for (int axis = 0; axis < 3; ++axis) {
+      p[axis] = (corner >> axis & 1) != 0 ? surface.bounds.upper[axis] : surface.bounds.lower[axis];
+    }
+    farthest = std::max(farthest, p.cross(turn.axis()).norm());
+  }
+  return std::min(surface.reach, farthest) * angle_between(from, to);
 }
 
 Vector3 velocity_of(const Pose& before, const Pose& now, const Vector3& point, double dt) {
@@ -179,6 +198,14 @@ void note_motion(StepContext& context, double way) {
   for (Clearance& clearance : context.state.clearances) clearance.shift += way;
 }
 
+void put_last_good_back(StepContext& context) {
+  OrganWorkspace& work = context.work();
+  recover(context.model(), work.last_good, context.state);
+  work.contacts.clear();
+  forget(work);
+  context.report.recovered = true;
+}
+
 bool all_awake(const std::vector<ContactPoint>& points, const OrganState& state) {
   for (const ContactPoint& point : points) {
     for (int i = 0; i < point.bearers.count; ++i) {
@@ -247,30 +274,31 @@ void begin_report(const World& world, const Motion& motion, StepReport& report) 
 }
 
 int count_substeps(StepContext& context) {
-  OrganWorkspace& work = context.work();
-  work.contacts.clear();
+  context.work().contacts.clear();
   context.slept = context.state.asleep;
   for (std::size_t i = 0; i < context.motion.instruments.size(); ++i) {
     context.workspace.now[i] = context.motion.instruments[i].from;
   }
 
   const OrganModel& model = context.model();
+  const double most = most_cuts * std::max(1.0, context.motion.duration / cuts_period);
   double farthest = 0.0;
   bool near = false;
   for (const InstrumentPiece& piece : context.world.pieces) {
     const InstrumentMotion& motion = context.motion.instruments[piece.instrument];
     if (!motion.placed) continue;
-    const double way = (motion.to.position - motion.from.position).norm() +
-                       angle_between(motion.from, motion.to) * piece.surface.reach;
+    const double shift = (motion.to.position - motion.from.position).norm();
+    const double way = shift + angle_between(motion.from, motion.to) * piece.surface.reach;
     Box swept = scene_bounds(piece.surface.bounds, motion.from);
     swept.add(scene_bounds(piece.surface.bounds, motion.to));
     // Between the two a rotation can leave both boxes by no more than the whole way.
-    if (!swept.grown(way).overlaps(bounds_of(work.patches))) continue;
-    farthest = std::max(farthest, way);
+    if (!swept.grown(way).overlaps(bounds_of(context.work().patches))) continue;
     near = true;
+    const bool jumps = way > most * model.motion_limit;
+    farthest = std::max(farthest, jumps ? shift + way_of_turn(piece.surface, motion.from, motion.to) : way);
   }
   const double cuts = std::ceil(farthest / model.motion_limit);
-  const int for_motion = cuts <= most_motion_substeps ? static_cast<int>(cuts) : 1;
+  const int for_motion = cuts <= most ? static_cast<int>(cuts) : 1;
   const bool one_is_enough = model.integrator == Integrator::vertex_block_descent || (context.state.asleep && !near);
   const int for_elements =
       one_is_enough ? 1 : substeps_for(model.rest, context.motion.duration, context.state.stiffening);
@@ -403,7 +431,7 @@ void deform(StepContext& context) {
   const OrganWorkspace& work = context.work();
   const double speed = integrate_elements(context);
   note_motion(context, context.dt * speed);
-  if (work.points.empty() && speed < sleep_speed) {
+  if (work.points.empty() && speed < std::min(sleep_speed, sleep_rate * model.rest.size)) {
     context.state.asleep = true;
     stand_still(context.state);
   }
@@ -426,20 +454,27 @@ void bear(StepContext& context) {
   for (const ContactPoint& point : work.points) record_contact(context, point);
 }
 
+void recall(StepContext& context) {
+  const Lap lap(context.report.profile.health);
+  if (!remembers_numbers(context.state)) put_last_good_back(context);
+}
+
 void check_health(StepContext& context) {
   const Lap lap(context.report.profile.health);
+  const OrganModel& model = context.model();
   OrganWorkspace& work = context.work();
+  bool good = healthy_in_turn(model, context.state, work.turn++);
+  for (std::size_t p = 0; p < work.near.size(); ++p) {
+    good = good && (!work.near[p] || remembers_numbers(context.state.clearances[p], model.poking[p]));
+  }
   // What fell asleep in this step is looked at: a position that is not a number has no speed and touches nothing.
-  if (context.slept && context.state.asleep && work.contacts.empty()) return;
-  if (healthy(context.model(), context.state)) {
-    copy_state(context.model(), context.state, work.last_good);
+  const bool idle = context.slept && context.state.asleep && work.contacts.empty();
+  if (good && idle) return;
+  if (good && healthy(model, context.state)) {
+    copy_state(model, context.state, work.last_good);
     return;
   }
-  copy_state(context.model(), work.last_good, context.state);
-  stand_still(context.state);
-  work.contacts.clear();
-  forget(work);
-  context.report.recovered = true;
+  put_last_good_back(context);
 }
 
 void report_contacts(StepContext& context) {

@@ -9,6 +9,7 @@ namespace tissue_sim {
 namespace {
 
 void step_organ(StepContext& context) {
+  recall(context);  // what contacts, centres and levels left: numbers, or the last good state
   const int substeps = count_substeps(context);
   for (int i = 1; i <= substeps; ++i) {
     place_instruments(context, i, substeps);  // poses at the end of the substep

@@ -267,7 +267,7 @@ double stable_substep(const RestShape& shape, double safety) {
                         });
 
   const double a = omega_squared / (4.0 * safety * safety);
-  const double b = lambda / (2.0 * safety);
+  const double b = lambda / (2.0 * (shape.tetrahedra.empty() ? std::min(safety, surface_safety) : safety));
   return a > 0.0 ? (std::sqrt(b * b + 4.0 * a) - b) / (2.0 * a) : 0.0;
 }
 

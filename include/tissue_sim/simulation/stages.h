@@ -36,6 +36,9 @@ struct StepContext {
 
 void begin_report(const World& world, const Motion& motion, StepReport& report);
 
+/// Puts the last good state of the organ back where what it remembers is not numbers: the step would read it.
+void recall(StepContext& context);
+
 /// As many as the elements need, and as many as keep an instrument near the organ from moving farther than the motion
 /// limit in one.
 int count_substeps(StepContext& context);
@@ -49,7 +52,8 @@ void respond(StepContext& context);
 void deform(StepContext& context);
 void bear(StepContext& context);
 
-/// Puts the last good state of the organ back, at rest, when a number is not finite or a vertex has run away.
+/// Puts the last good state of the organ back, at rest, when a number is not finite or a vertex has run away. What the
+/// step works on is looked at in every step, the rest of a large organ in turn.
 void check_health(StepContext& context);
 
 void report_contacts(StepContext& context);
