@@ -194,7 +194,7 @@ void add_poke_contacts(const OrganSurface& organ, const InstrumentSurface& instr
     const bool poked_before = clearance.pokes[u] != 0;
     clearance.pokes[u] = 0;
     const double travelled = clearance.shift + clearance.turn * instrument.vertices[u].norm();
-    if (travelled < clearance.free_until[u]) continue;
+    if (!(travelled >= clearance.free_until[u])) continue;  // a NaN stays for the health check
 
     const Vector3 tip = pose.apply(instrument.vertices[u]);
     const ClosestOnMesh closest =

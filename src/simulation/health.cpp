@@ -1,7 +1,10 @@
 #include "tissue_sim/simulation/health.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+
+#include "tissue_sim/simulation/integrator.h"
 
 namespace tissue_sim {
 
@@ -10,8 +13,8 @@ namespace {
 constexpr double fastest = 1500.0;  ///< m/s, the speed of sound in soft tissue
 constexpr double farthest = 10.0;   ///< times the organ's size
 
-/// Vertices of which a step looks at everything, in turn: 10 us of them. A million would cost more than the step.
-constexpr std::size_t looked_at_in_turn = 4096;
+/// Vertices of which a step looks at everything, in turn: some 5 us. A million would cost more than the step.
+constexpr std::size_t looked_at_in_turn = 1024;
 
 /// One vertex. Written so that a NaN fails.
 bool healthy(const Vector3& rest, const Vector3& position, const Vector3& velocity, double limit) {
@@ -19,6 +22,10 @@ bool healthy(const Vector3& rest, const Vector3& position, const Vector3& veloci
 }
 
 }  // namespace
+
+bool runs_away(double speed) {
+  return !(speed < fastest);
+}
 
 bool healthy(const OrganModel& model, const OrganState& state) {
   const RestShape& rest = model.rest;
@@ -41,6 +48,21 @@ bool healthy(const OrganModel& model, const OrganState& state) {
     }
   }
   return true;
+}
+
+bool is_inside_out(const OrganModel& model, const OrganState& state) {
+  if (state.wakes_in_parts()) return false;  // what sleeps is at rest
+  const RestShape& rest = model.rest;
+  const auto turned = [&](const std::array<int, 4>& corners) {
+    const auto at = [&](std::size_t i) -> const Vector3& { return state.positions[corners[i]]; };
+    return !(area_normal(at(0), at(1), at(2)).dot(at(3) - at(0)) > 0.0);
+  };
+  for (const NeoHookeanElement& element : rest.tetrahedra) {
+    if (turned(element.vertices)) return true;
+  }
+  if (!rest.areas.empty() || rest.enclosed.stiffness > 0.0) return false;  // the flaps of a wall, which turn
+  return std::any_of(rest.volumes.begin(), rest.volumes.end(),
+                     [&](const VolumeElement& element) { return turned(element.vertices); });
 }
 
 namespace {
@@ -102,6 +124,9 @@ bool remembers_numbers(const Clearance& clearance, const std::vector<int>& verti
 bool healthy_in_turn(const OrganModel& model, const OrganState& state, std::uint64_t turn) {
   const auto first = static_cast<std::size_t>(model.rest.first_simulated);
   const auto numbers = [turn](const auto& items, std::size_t from) { return are_numbers_in_turn(items, from, turn); };
+  for (const Clearance& clearance : state.clearances) {
+    if (!numbers(clearance.free_until, 0) || !numbers(clearance.first_touch, 0)) return false;
+  }
   for (const LevelState& level : state.levels) {
     if (!numbers(level.positions, 0) || !numbers(level.velocities, 0)) return false;
     if (!numbers(level.forces, 0) || !numbers(level.push, 0)) return false;
@@ -123,6 +148,7 @@ void recover(const OrganModel& model, const OrganState& last_good, OrganState& s
   std::fill(state.depths.begin(), state.depths.end(), 0.0);
   std::fill(state.velocities.begin(), state.velocities.end(), Vector3::Zero());
   for (LevelState& level : state.levels) std::fill(level.velocities.begin(), level.velocities.end(), Vector3::Zero());
+  state.stiffening = most_stiffening;
   for (Clearance& clearance : state.clearances) {
     if (are_numbers(clearance.free_until) && are_numbers(clearance.first_touch)) continue;
     clearance = Clearance(clearance.free_until.size());  // the copy was made before anything looked at it

@@ -13,16 +13,22 @@ namespace tissue_sim {
 
 namespace {
 
-/// More cuts than this in a millisecond is a jump, not a motion: it is not swept. Where cuts are of half a millimetre,
-/// as on edges of 2 mm, that is 300 m/s; with a probe of 1 mm the end of a tool of 0.2 m that turns end over end 100
-/// times a second is still felt. Steps longer than a millisecond have as many more: 5 m/s are 250 mm in 50 ms.
-constexpr int most_cuts = 600;
-constexpr double cuts_period = 0.001;  ///< s
+/// More cuts than this for one step, and faster (m/s) than this, is a jump, not a motion: it is not swept. The end of a
+/// tool of 0.2 m that turns end over end 100 times a second is slower; in a step of 50 ms 5 m/s are 250 mm.
+constexpr int most_cuts = 300;
+constexpr double fastest_motion = 130.0;
 
 /// m/s, and of the organ's size in a second. An untouched organ whose fastest vertex is slower than both goes to sleep:
 /// what is left to move is far below a micrometre, and below a millionth of the size.
 constexpr double sleep_speed = 1e-7;
 constexpr double sleep_rate = 5e-7;
+
+/// A step after it was measured: what was pressed does not stop being stretched when the instrument is gone. A ball
+/// that had flown through at 5 m/s left a block that went bad in every step after it.
+constexpr double stiffening_left = 0.95;
+
+/// Bad steps in a row after which the last good state is not good: the organ goes to rest.
+constexpr int most_bad_steps = 10;
 
 /// Adds the time from here to the end of the scope to a stage of the profile.
 class Lap {
@@ -187,7 +193,8 @@ double integrate_elements(StepContext& context) {
     follow_coarser(model, context.dt, state);
   }
   if (context.substep == context.substeps) {  // the next step asks for it
-    state.stiffening = stiffening(model.rest, model.tetrahedra_at, work.points, state.positions);
+    state.stiffening = std::max(stiffening(model.rest, model.tetrahedra_at, work.points, state.positions),
+                                stiffening_left * state.stiffening);
   }
   return speed;
 }
@@ -200,6 +207,7 @@ void note_motion(StepContext& context, double way) {
 
 void put_last_good_back(StepContext& context) {
   OrganWorkspace& work = context.work();
+  if (++work.bad_steps > most_bad_steps) work.last_good = rest_state(context.world, context.organ);
   recover(context.model(), work.last_good, context.state);
   work.contacts.clear();
   forget(work);
@@ -281,7 +289,7 @@ int count_substeps(StepContext& context) {
   }
 
   const OrganModel& model = context.model();
-  const double most = most_cuts * std::max(1.0, context.motion.duration / cuts_period);
+  const double much = most_cuts * model.motion_limit;
   double farthest = 0.0;
   bool near = false;
   for (const InstrumentPiece& piece : context.world.pieces) {
@@ -294,11 +302,11 @@ int count_substeps(StepContext& context) {
     // Between the two a rotation can leave both boxes by no more than the whole way.
     if (!swept.grown(way).overlaps(bounds_of(context.work().patches))) continue;
     near = true;
-    const bool jumps = way > most * model.motion_limit;
-    farthest = std::max(farthest, jumps ? shift + way_of_turn(piece.surface, motion.from, motion.to) : way);
+    farthest = std::max(farthest, way > much ? shift + way_of_turn(piece.surface, motion.from, motion.to) : way);
   }
-  const double cuts = std::ceil(farthest / model.motion_limit);
-  const int for_motion = cuts <= most ? static_cast<int>(cuts) : 1;
+  const bool jumps = farthest > much && farthest > fastest_motion * context.motion.duration;
+  context.jumps = jumps;
+  const int for_motion = jumps ? 1 : static_cast<int>(std::ceil(farthest / model.motion_limit));
   const bool one_is_enough = model.integrator == Integrator::vertex_block_descent || (context.state.asleep && !near);
   const int for_elements =
       one_is_enough ? 1 : substeps_for(model.rest, context.motion.duration, context.state.stiffening);
@@ -414,6 +422,7 @@ void respond(StepContext& context) {
   }
   context.state.asleep = context.state.asleep && !rest.elastic();
   for (ContactPoint& point : work.points) {
+    if (context.jumps) break;  // what was not on its way throws nothing
     const int instrument = context.world.pieces[point.piece].instrument;
     const Vector3 place = at_point(point, context.state.positions);
     point.instrument_velocity =
@@ -430,6 +439,7 @@ void deform(StepContext& context) {
   const Lap lap(context.report.profile.deformation);
   const OrganWorkspace& work = context.work();
   const double speed = integrate_elements(context);
+  context.ran_away = runs_away(speed);
   note_motion(context, context.dt * speed);
   if (work.points.empty() && speed < std::min(sleep_speed, sleep_rate * model.rest.size)) {
     context.state.asleep = true;
@@ -467,11 +477,16 @@ void check_health(StepContext& context) {
   for (std::size_t p = 0; p < work.near.size(); ++p) {
     good = good && (!work.near[p] || remembers_numbers(context.state.clearances[p], model.poking[p]));
   }
+  if (good && !context.slept && context.state.asleep && model.restoration && is_inside_out(model, context.state)) {
+    work.last_good = rest_state(context.world, context.organ);
+    good = false;
+  }
   // What fell asleep in this step is looked at: a position that is not a number has no speed and touches nothing.
   const bool idle = context.slept && context.state.asleep && work.contacts.empty();
   if (good && idle) return;
   if (good && healthy(model, context.state)) {
     copy_state(model, context.state, work.last_good);
+    work.bad_steps = 0;
     return;
   }
   put_last_good_back(context);

@@ -56,7 +56,8 @@ void refuse_if_too_stiff(const Scene& scene, const Organ& organ, const RestShape
   line.precision(2);
   line << "organ " << organ.name << ": a step of " << scene.time_step << " s needs " << substeps << " substeps of "
        << rest.stable_substep << " s, more than max_substeps: " << scene.max_substeps
-       << "; time_step: " << rounded_down(0.999 * time_step) << " or material young: " << rounded_down(0.998 * softer * organ.material.young)
+       << "; time_step: " << rounded_down(0.999 * time_step)
+       << " or material young: " << rounded_down(0.998 * softer * organ.material.young)
        << " would do, or a higher max_substeps";
   throw SceneError(line.str());
 }

@@ -15,7 +15,9 @@ struct StepContext {
   double dt = 0.0;  ///< s, of the substep
   int substep = 1;  ///< the first is 1
   int substeps = 1;
-  bool slept = false;  ///< the organ was asleep when the step began
+  bool jumps = false;     ///< an instrument is elsewhere at once: not swept
+  bool ran_away = false;  ///< in this substep: what comes after it would only overflow
+  bool slept = false;     ///< the organ was asleep when the step began
 
   const OrganModel& model() const { return world.organs[organ]; }
   OrganWorkspace& work() { return workspace.organs[organ]; }
