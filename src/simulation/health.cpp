@@ -1,7 +1,6 @@
 #include "tissue_sim/simulation/health.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "tissue_sim/simulation/integrator.h"
@@ -48,21 +47,6 @@ bool healthy(const OrganModel& model, const OrganState& state) {
     }
   }
   return true;
-}
-
-bool is_inside_out(const OrganModel& model, const OrganState& state) {
-  if (state.wakes_in_parts()) return false;  // what sleeps is at rest
-  const RestShape& rest = model.rest;
-  const auto turned = [&](const std::array<int, 4>& corners) {
-    const auto at = [&](std::size_t i) -> const Vector3& { return state.positions[corners[i]]; };
-    return !(area_normal(at(0), at(1), at(2)).dot(at(3) - at(0)) > 0.0);
-  };
-  for (const NeoHookeanElement& element : rest.tetrahedra) {
-    if (turned(element.vertices)) return true;
-  }
-  if (!rest.areas.empty() || rest.enclosed.stiffness > 0.0) return false;  // the flaps of a wall, which turn
-  return std::any_of(rest.volumes.begin(), rest.volumes.end(),
-                     [&](const VolumeElement& element) { return turned(element.vertices); });
 }
 
 namespace {

@@ -477,10 +477,6 @@ void check_health(StepContext& context) {
   for (std::size_t p = 0; p < work.near.size(); ++p) {
     good = good && (!work.near[p] || remembers_numbers(context.state.clearances[p], model.poking[p]));
   }
-  if (good && !context.slept && context.state.asleep && model.restoration && is_inside_out(model, context.state)) {
-    work.last_good = rest_state(context.world, context.organ);
-    good = false;
-  }
   // What fell asleep in this step is looked at: a position that is not a number has no speed and touches nothing.
   const bool idle = context.slept && context.state.asleep && work.contacts.empty();
   if (good && idle) return;

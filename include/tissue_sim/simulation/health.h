@@ -8,10 +8,6 @@ namespace tissue_sim {
 /// none is farther than ten times the organ's size from where it belongs.
 bool healthy(const OrganModel& model, const OrganState& state);
 
-/// Whether a tetrahedron of a solid is. There are shapes at rest where some are, which no organ is in and none comes
-/// out of by itself.
-bool is_inside_out(const OrganModel& model, const OrganState& state);
-
 /// Whether a vertex so fast (m/s) is beyond that; so is one whose speed is no number.
 bool runs_away(double speed);
 
