@@ -194,11 +194,11 @@ void add_poke_contacts(const OrganSurface& organ, const InstrumentSurface& instr
     const bool poked_before = clearance.pokes[u] != 0;
     clearance.pokes[u] = 0;
     const double travelled = clearance.shift + clearance.turn * instrument.vertices[u].norm();
-    if (travelled < clearance.free_until[u]) continue;
+    if (!(travelled >= clearance.free_until[u])) continue;  // a NaN stays for the health check
 
     const Vector3 tip = pose.apply(instrument.vertices[u]);
     const ClosestOnMesh closest =
-        closest_on_organ(organ, tip, std::numeric_limits<double>::max(), clearance.nearest[u]);
+        closest_on_organ(organ, tip, std::numeric_limits<double>::infinity(), clearance.nearest[u]);
     if (closest.triangle < 0) continue;  // a position that is not a number is near nothing
     const double distance = std::sqrt(closest.squared_distance);
     clearance.nearest[u] = closest.triangle;

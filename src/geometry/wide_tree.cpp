@@ -56,7 +56,12 @@ TISSUE_SIM_INLINE const Four& four(const FloatPoint& p) {
   return *reinterpret_cast<const Four*>(p.data());
 }
 
-/// The children whose boxes overlap `box`, a bit each. A NaN overlaps nothing.
+/// Bits of the lanes that have a child.
+TISSUE_SIM_INLINE unsigned occupied(const WideTree::Node& node) {
+  return (1U << static_cast<unsigned>(node.children)) - 1U;
+}
+
+/// The children whose boxes overlap the box, a bit each. A NaN overlaps nothing.
 template <class Lane>
 TISSUE_SIM_INLINE unsigned overlapping(const WideTree::Node& node, const FloatPoint& lower, const FloatPoint& upper) {
   unsigned bits = 0;
@@ -66,7 +71,7 @@ TISSUE_SIM_INLINE unsigned overlapping(const WideTree::Node& node, const FloatPo
                          (lane<Lane>(node.lower[2], l) <= upper[2]) & (lane<Lane>(node.upper[2], l) >= lower[2]);
     bits |= bits_of(overlap) << l;
   }
-  return bits;
+  return bits & occupied(node);
 }
 
 template <class Lane>
@@ -149,11 +154,11 @@ TISSUE_SIM_INLINE void for_each_leaf(const WideTree& tree, const FloatPoint& low
   }
 }
 
-/// No number is on either side of a NaN: a point that is at infinity is not beside it.
+/// Not NaN, which could not be compared where floating-point traps are on.
 void clear(WideTree::Node& node) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    node.lower[axis].fill(std::numeric_limits<float>::quiet_NaN());
-    node.upper[axis].fill(std::numeric_limits<float>::quiet_NaN());
+    node.lower[axis].fill(infinite);
+    node.upper[axis].fill(-infinite);
   }
   node.child.fill(-1);
   node.children = 0;
@@ -447,7 +452,7 @@ TISSUE_SIM_INLINE unsigned squared_distances(const WideTree::Node& node, const F
     *reinterpret_cast<Lane*>(distances.data() + l) = sum;
     near |= bits_of(sum <= limit) << l;
   }
-  return near & ((1U << static_cast<unsigned>(node.children)) - 1U);
+  return near & occupied(node);
 }
 
 /// Raises the distances of a leaf's triangles to those of their planes, and takes away the bits of what is then farther

@@ -1,13 +1,19 @@
 #include "tissue_sim/simulation/health.h"
 
+#include <algorithm>
+#include <cmath>
+
+#include "tissue_sim/simulation/integrator.h"
+
 namespace tissue_sim {
 
 namespace {
+
 constexpr double fastest = 1500.0;  ///< m/s, the speed of sound in soft tissue
 constexpr double farthest = 10.0;   ///< times the organ's size
-}  // namespace
 
-namespace {
+/// Vertices of which a step looks at everything, in turn: some 5 us. A million would cost more than the step.
+constexpr std::size_t looked_at_in_turn = 1024;
 
 /// One vertex. Written so that a NaN fails.
 bool healthy(const Vector3& rest, const Vector3& position, const Vector3& velocity, double limit) {
@@ -15,6 +21,10 @@ bool healthy(const Vector3& rest, const Vector3& position, const Vector3& veloci
 }
 
 }  // namespace
+
+bool runs_away(double speed) {
+  return !(speed < fastest);
+}
 
 bool healthy(const OrganModel& model, const OrganState& state) {
   const RestShape& rest = model.rest;
@@ -37,6 +47,96 @@ bool healthy(const OrganModel& model, const OrganState& state) {
     }
   }
   return true;
+}
+
+namespace {
+
+bool is_number(double x) {
+  return std::isfinite(x);
+}
+bool is_number(const Vector3& x) {
+  return x.allFinite();
+}
+
+template <class Item>
+bool are_numbers(const std::vector<Item>& items) {
+  return std::all_of(items.begin(), items.end(), [](const Item& item) { return is_number(item); });
+}
+
+/// Of the vertices from `first` on whose turn it is.
+template <class Item>
+bool are_numbers_in_turn(const std::vector<Item>& items, std::size_t first, std::uint64_t turn) {
+  if (first >= items.size()) return true;
+  const std::size_t all = items.size() - first;
+  const std::size_t begin = all > looked_at_in_turn ? static_cast<std::size_t>(turn * looked_at_in_turn % all) : 0;
+  for (std::size_t i = 0; i < std::min(all, looked_at_in_turn); ++i) {
+    if (!is_number(items[first + (begin + i) % all])) return false;
+  }
+  return true;
+}
+
+/// What sleeps goes to where it sleeps.
+template <class Sleeping>
+void lay_down(const RestShape& shape, Sleeping& sleeping) {
+  sleeping.positions = shape.positions;
+  std::fill(sleeping.velocities.begin(), sleeping.velocities.end(), Vector3::Zero());
+}
+
+}  // namespace
+
+bool remembers_numbers(const OrganState& state) {
+  for (const Clearance& clearance : state.clearances) {
+    if (!is_number(clearance.shift) || !is_number(clearance.turn)) return false;
+  }
+  for (const PlaceForce& place : state.pressing) {
+    if (!is_number(place.force) || !is_number(place.stopping)) return false;
+  }
+  for (const std::vector<Vector3>& centres : state.centres) {
+    if (!are_numbers(centres)) return false;
+  }
+  for (const LevelState& level : state.levels) {
+    if (!is_number(level.ahead) || !is_number(level.speed)) return false;
+  }
+  return are_numbers(state.untouched) && is_number(state.stiffening);
+}
+
+bool remembers_numbers(const Clearance& clearance, const std::vector<int>& vertices) {
+  return std::all_of(vertices.begin(), vertices.end(),
+                     [&](int v) { return is_number(clearance.free_until[v]) && is_number(clearance.first_touch[v]); });
+}
+
+bool healthy_in_turn(const OrganModel& model, const OrganState& state, std::uint64_t turn) {
+  const auto first = static_cast<std::size_t>(model.rest.first_simulated);
+  const auto numbers = [turn](const auto& items, std::size_t from) { return are_numbers_in_turn(items, from, turn); };
+  for (const Clearance& clearance : state.clearances) {
+    if (!numbers(clearance.free_until, 0) || !numbers(clearance.first_touch, 0)) return false;
+  }
+  for (const LevelState& level : state.levels) {
+    if (!numbers(level.positions, 0) || !numbers(level.velocities, 0)) return false;
+    if (!numbers(level.forces, 0) || !numbers(level.push, 0)) return false;
+  }
+  return numbers(state.positions, first) && numbers(state.velocities, first) && numbers(state.forces, first) &&
+         numbers(state.depths, 0);
+}
+
+void recover(const OrganModel& model, const OrganState& last_good, OrganState& state) {
+  if (state.wakes_in_parts()) lay_down(model.rest, state);
+  for (std::size_t level = 0; level < state.levels.size(); ++level) {
+    LevelState& at = state.levels[level];
+    lay_down(model.levels[level].shape, at);
+    std::fill(at.push.begin(), at.push.end(), Vector3::Zero());
+    std::fill(at.forces.begin(), at.forces.end(), Vector3::Zero());
+  }
+  copy_state(model, last_good, state);
+  std::fill(state.forces.begin(), state.forces.end(), Vector3::Zero());
+  std::fill(state.depths.begin(), state.depths.end(), 0.0);
+  std::fill(state.velocities.begin(), state.velocities.end(), Vector3::Zero());
+  for (LevelState& level : state.levels) std::fill(level.velocities.begin(), level.velocities.end(), Vector3::Zero());
+  state.stiffening = most_stiffening;
+  for (Clearance& clearance : state.clearances) {
+    if (are_numbers(clearance.free_until) && are_numbers(clearance.first_touch)) continue;
+    clearance = Clearance(clearance.free_until.size());  // the copy was made before anything looked at it
+  }
 }
 
 }  // namespace tissue_sim

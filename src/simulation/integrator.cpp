@@ -18,9 +18,6 @@ constexpr double covered_stiffening = 1.5;
 /// step with that, and in none with 1.0 or 0.7.
 constexpr double solid_stiffening = 0.7;
 
-/// Beyond four times the substeps it is a matter of the health check.
-constexpr double most_stiffening = 16.0;
-
 /// All vertices that are simulated, or those of a list.
 struct EveryVertex {
   std::size_t first;
@@ -237,7 +234,7 @@ void prepare(ElementRoom& room, const RestShape& rest) {
 
 int substeps_for(const RestShape& rest, double duration, double stiffening) {
   if (!rest.elastic()) return 1;
-  const double shorter = std::sqrt(std::clamp(stiffening / solid_stiffening, 1.0, most_stiffening));
+  const double shorter = std::sqrt(std::clamp(stiffening, solid_stiffening, most_stiffening) / solid_stiffening);
   return std::max(1, static_cast<int>(std::ceil(shorter * duration / rest.stable_substep - 1e-9)));
 }
 

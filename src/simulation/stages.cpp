@@ -13,12 +13,22 @@ namespace tissue_sim {
 
 namespace {
 
-/// More cuts than this for one step is a jump, not a motion (60 m/s with 1 ms steps on 2 mm edges): it is not swept.
-constexpr int most_motion_substeps = 300;
+/// More cuts than this for one step, and faster (m/s) than this, is a jump, not a motion: it is not swept. The end of a
+/// tool of 0.2 m that turns end over end 100 times a second is slower; in a step of 50 ms 5 m/s are 250 mm.
+constexpr int most_cuts = 300;
+constexpr double fastest_motion = 130.0;
 
-/// m/s. An untouched organ whose fastest vertex is slower goes to sleep: what is left to move is far below a
-/// micrometre.
+/// m/s, and of the organ's size in a second. An untouched organ whose fastest vertex is slower than both goes to sleep:
+/// what is left to move is far below a micrometre, and below a millionth of the size.
 constexpr double sleep_speed = 1e-7;
+constexpr double sleep_rate = 5e-7;
+
+/// A step after it was measured: what was pressed does not stop being stretched when the instrument is gone. A ball
+/// that had flown through at 5 m/s left a block that went bad in every step after it.
+constexpr double stiffening_left = 0.95;
+
+/// Bad steps in a row after which the last good state is not good: the organ goes to rest.
+constexpr int most_bad_steps = 10;
 
 /// Adds the time from here to the end of the scope to a stage of the profile.
 class Lap {
@@ -35,6 +45,21 @@ class Lap {
 
 double angle_between(const Pose& a, const Pose& b) {
   return a.orientation.angularDistance(b.orientation);
+}
+
+/// m. How far a turn from one pose to the other moves a point of the box at most: less than by all of its reach where
+/// the box lies along the axis, as a shaft that spins about itself.
+double way_of_turn(const InstrumentSurface& surface, const Pose& from, const Pose& to) {
+  const Eigen::AngleAxisd turn(from.orientation.conjugate() * to.orientation);
+  double farthest = 0.0;
+  for (int corner = 0; corner < 8; ++corner) {
+    Vector3 p;
+    for (int axis = 0; axis < 3; ++axis) {
+      p[axis] = (corner >> axis & 1) != 0 ? surface.bounds.upper[axis] : surface.bounds.lower[axis];
+    }
+    farthest = std::max(farthest, p.cross(turn.axis()).norm());
+  }
+  return std::min(surface.reach, farthest) * angle_between(from, to);
 }
 
 Vector3 velocity_of(const Pose& before, const Pose& now, const Vector3& point, double dt) {
@@ -167,7 +192,8 @@ double integrate_elements(StepContext& context) {
     follow_coarser(context.dt, state, work.levels);
   }
   if (context.substep == context.substeps) {  // the next step asks for it
-    state.stiffening = stiffening(model.rest, model.tetrahedra_at, work.points, state.positions);
+    state.stiffening = std::max(stiffening(model.rest, model.tetrahedra_at, work.points, state.positions),
+                                stiffening_left * state.stiffening);
   }
   return speed;
 }
@@ -176,6 +202,15 @@ double integrate_elements(StepContext& context) {
 void note_motion(StepContext& context, double way) {
   context.work().patches.travel += way;
   for (Clearance& clearance : context.state.clearances) clearance.shift += way;
+}
+
+void put_last_good_back(StepContext& context) {
+  OrganWorkspace& work = context.work();
+  if (++work.bad_steps > most_bad_steps) work.last_good = rest_state(context.world, context.organ);
+  recover(context.model(), work.last_good, context.state);
+  work.contacts.clear();
+  forget(work);
+  context.report.recovered = true;
 }
 
 bool all_awake(const std::vector<ContactPoint>& points, const OrganState& state) {
@@ -246,30 +281,31 @@ void begin_report(const World& world, const Motion& motion, StepReport& report) 
 }
 
 int count_substeps(StepContext& context) {
-  OrganWorkspace& work = context.work();
-  work.contacts.clear();
+  context.work().contacts.clear();
   context.slept = context.state.asleep;
   for (std::size_t i = 0; i < context.motion.instruments.size(); ++i) {
     context.workspace.now[i] = context.motion.instruments[i].from;
   }
 
   const OrganModel& model = context.model();
+  const double much = most_cuts * model.motion_limit;
   double farthest = 0.0;
   bool near = false;
   for (const InstrumentPiece& piece : context.world.pieces) {
     const InstrumentMotion& motion = context.motion.instruments[piece.instrument];
     if (!motion.placed) continue;
-    const double way = (motion.to.position - motion.from.position).norm() +
-                       angle_between(motion.from, motion.to) * piece.surface.reach;
+    const double shift = (motion.to.position - motion.from.position).norm();
+    const double way = shift + angle_between(motion.from, motion.to) * piece.surface.reach;
     Box swept = scene_bounds(piece.surface.bounds, motion.from);
     swept.add(scene_bounds(piece.surface.bounds, motion.to));
     // Between the two a rotation can leave both boxes by no more than the whole way.
-    if (!swept.grown(way).overlaps(bounds_of(work.patches))) continue;
-    farthest = std::max(farthest, way);
+    if (!swept.grown(way).overlaps(bounds_of(context.work().patches))) continue;
     near = true;
+    farthest = std::max(farthest, way > much ? shift + way_of_turn(piece.surface, motion.from, motion.to) : way);
   }
-  const double cuts = std::ceil(farthest / model.motion_limit);
-  const int for_motion = cuts <= most_motion_substeps ? static_cast<int>(cuts) : 1;
+  const bool jumps = farthest > much && farthest > fastest_motion * context.motion.duration;
+  context.jumps = jumps;
+  const int for_motion = jumps ? 1 : static_cast<int>(std::ceil(farthest / model.motion_limit));
   const bool one_is_enough = model.integrator == Integrator::vertex_block_descent || (context.state.asleep && !near);
   const int for_elements =
       one_is_enough ? 1 : substeps_for(model.rest, context.motion.duration, context.state.stiffening);
@@ -385,6 +421,7 @@ void respond(StepContext& context) {
   }
   context.state.asleep = context.state.asleep && !rest.elastic();
   for (ContactPoint& point : work.points) {
+    if (context.jumps) break;  // what was not on its way throws nothing
     const int instrument = context.world.pieces[point.piece].instrument;
     const Vector3 place = at_point(point, context.state.positions);
     point.instrument_velocity =
@@ -401,8 +438,9 @@ void deform(StepContext& context) {
   const Lap lap(context.report.profile.deformation);
   const OrganWorkspace& work = context.work();
   const double speed = integrate_elements(context);
+  context.ran_away = runs_away(speed);
   note_motion(context, context.dt * speed);
-  if (work.points.empty() && speed < sleep_speed) {
+  if (work.points.empty() && speed < std::min(sleep_speed, sleep_rate * model.rest.size)) {
     context.state.asleep = true;
     stand_still(context.state);
   }
@@ -425,20 +463,28 @@ void bear(StepContext& context) {
   for (const ContactPoint& point : work.points) record_contact(context, point);
 }
 
+void recall(StepContext& context) {
+  const Lap lap(context.report.profile.health);
+  if (!remembers_numbers(context.state)) put_last_good_back(context);
+}
+
 void check_health(StepContext& context) {
   const Lap lap(context.report.profile.health);
+  const OrganModel& model = context.model();
   OrganWorkspace& work = context.work();
+  bool good = healthy_in_turn(model, context.state, work.turn++);
+  for (std::size_t p = 0; p < work.near.size(); ++p) {
+    good = good && (!work.near[p] || remembers_numbers(context.state.clearances[p], model.poking[p]));
+  }
   // What fell asleep in this step is looked at: a position that is not a number has no speed and touches nothing.
-  if (context.slept && context.state.asleep && work.contacts.empty()) return;
-  if (healthy(context.model(), context.state)) {
-    copy_state(context.model(), context.state, work.last_good);
+  const bool idle = context.slept && context.state.asleep && work.contacts.empty();
+  if (good && idle) return;
+  if (good && healthy(model, context.state)) {
+    copy_state(model, context.state, work.last_good);
+    work.bad_steps = 0;
     return;
   }
-  copy_state(context.model(), work.last_good, context.state);
-  stand_still(context.state);
-  work.contacts.clear();
-  forget(work);
-  context.report.recovered = true;
+  put_last_good_back(context);
 }
 
 void report_contacts(StepContext& context) {

@@ -120,6 +120,7 @@ void copy_state(const OrganModel& model, const OrganState& from, OrganState& to)
         copy.push[v] = source.push[v];
       }
       copy.ahead = source.ahead;
+      copy.speed = source.speed;
       copy_region(source.region, copy.region);
     }
     to.centres = from.centres;

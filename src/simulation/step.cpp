@@ -9,8 +9,9 @@ namespace tissue_sim {
 namespace {
 
 void step_organ(StepContext& context) {
+  recall(context);  // what contacts, centres and levels left: numbers, or the last good state
   const int substeps = count_substeps(context);
-  for (int i = 1; i <= substeps; ++i) {
+  for (int i = 1; i <= substeps && !context.ran_away; ++i) {
     place_instruments(context, i, substeps);  // poses at the end of the substep
     refit(context);                           // the tree of the organ, where an instrument is near
     find_crossings(context);                  // stage 1: crossings, border vertices, colliding vertices

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "tissue_sim/tissue/energy.h"
+
 namespace tissue_sim {
 
 namespace {
@@ -14,6 +16,10 @@ constexpr double sweep_period = 1e-3;
 /// How much stiffer than the vertices that bear it a shared contact point is held. A much stiffer one would lock its
 /// vertices in the places where the first sweep put them.
 constexpr double shared_stiffness = 2.0;
+
+/// Times the fastest vibration's angle in a step: from here on a step may start at a part of its way only. With 1 ms
+/// tissue of 5.4 kPa on edges of 5 mm is at 4, and starts at the end of its way as it always did.
+constexpr double long_step = 5.0;
 
 /// Constraint elements at vertex v. Damped along their gradient by what all their vertices moved since the start.
 template <class Kind>
@@ -104,6 +110,7 @@ class Descent {
   bool moves(int v) const { return rest().inverse_mass[v] > 0.0 && !state_.holds(static_cast<std::size_t>(v)); }
   double inertia(int v) const { return inertia_ * rest().mass[v]; }
   void place(int v, const Vector3& position);
+  double part_of_the_way(double slowed, const Vector3& gravity);
   LocalStiffness of_tetrahedra(int v) const {
     if (room_.displacements.empty()) return {};
     return corner_sum_(organ_.incidence.tetrahedra, v, room_.displacements.data());
@@ -143,6 +150,10 @@ void Descent::start(const Vector3& gravity) {
   for (int v = rest().first_simulated; v < vertices; ++v) {
     if (moves(v)) place(v, state_.positions[v] + slowed * dt_ * state_.velocities[v]);
   }
+  const double part = part_of_the_way(slowed, gravity);
+  for (int v = rest().first_simulated; part < 1.0 && v < vertices; ++v) {
+    if (moves(v)) place(v, room_.start[v] + part * slowed * dt_ * state_.velocities[v]);
+  }
 
   room_.pressing.clear();
   for (std::size_t p = 0; p < points_.size(); ++p) {
@@ -157,6 +168,30 @@ void Descent::start(const Vector3& gravity) {
     }
     point.stiffness = yielding > 0.0 ? shared_stiffness / yielding : 0.0;
   }
+}
+
+/// A sweep of a long step reaches only a little of what the elements ask for, above all in tissue that hardly yields:
+/// the motion goes on into places that take a hundred times the energy it has. A block of 0.2 mm edges, E 500 Pa,
+/// nu 0.499, went on after a press until it had turned inside out. So where the way costs more energy than the motion
+/// has, what contacts and gravity give included, the step starts at the part of it that an exact step along it would
+/// go.
+double Descent::part_of_the_way(double slowed, const Vector3& gravity) {
+  if (!(dt_ * rest().fastest_frequency > long_step)) return 1.0;
+  double motion = 0.0;  // J
+  double work = 0.0;    // J, of gravity and of the contacts, as they pressed before
+  const int vertices = static_cast<int>(state_.positions.size());
+  for (int v = rest().first_simulated; v < vertices; ++v) {
+    if (!moves(v)) continue;
+    motion += 0.5 * rest().mass[v] * (slowed * state_.velocities[v]).squaredNorm();
+    work += rest().mass[v] * gravity.dot(state_.positions[v] - room_.start[v]);
+  }
+  for (const ContactPoint& point : points_) {
+    const Vector3 way = at_point(point, state_.positions) - at_point(point, room_.start);
+    work += std::max(0.0, point.force * point.direction.dot(way));
+  }
+  const double taken_up = elastic_energy(rest(), state_.positions, room_.scratch) -
+                          elastic_energy(rest(), room_.start, room_.scratch) - work;
+  return taken_up > motion ? motion / (motion + taken_up) : 1.0;
 }
 
 void Descent::place(int v, const Vector3& position) {
@@ -292,6 +327,7 @@ Incidence build_incidence(const RestShape& rest) {
 void prepare(DescentRoom& room, const RestShape& rest) {
   room.start = rest.positions;
   room.inertial = rest.positions;
+  room.scratch = rest.positions;
   if (!rest.tetrahedra.empty()) room.displacements.assign(rest.positions.size(), Eigen::Vector4f::Zero());
   room.first_of.assign(rest.positions.size(), -1);
 }

@@ -41,6 +41,12 @@ double wall_region_lengths(double tolerance) {
   return 8.0 + 2.0 * std::log(0.05 / tolerance);
 }
 
+/// To two digits, downwards: what an error says would do must do.
+double rounded_down(double x) {
+  const double digit = std::pow(10.0, std::floor(std::log10(x)) - 1.0);
+  return std::floor(x / digit) * digit;
+}
+
 void refuse_if_too_stiff(const Scene& scene, const Organ& organ, const RestShape& rest) {
   const int substeps = substeps_for(rest, scene.time_step);
   if (substeps <= scene.max_substeps) return;
@@ -50,7 +56,8 @@ void refuse_if_too_stiff(const Scene& scene, const Organ& organ, const RestShape
   line.precision(2);
   line << "organ " << organ.name << ": a step of " << scene.time_step << " s needs " << substeps << " substeps of "
        << rest.stable_substep << " s, more than max_substeps: " << scene.max_substeps
-       << "; time_step: " << 0.99 * time_step << " or material young: " << 0.98 * softer * organ.material.young
+       << "; time_step: " << rounded_down(0.999 * time_step)
+       << " or material young: " << rounded_down(0.998 * softer * organ.material.young)
        << " would do, or a higher max_substeps";
   throw SceneError(line.str());
 }

@@ -1,7 +1,6 @@
 #include "tissue_sim/study/loading.h"
 
 #include <malloc.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <cmath>
@@ -15,6 +14,7 @@
 #include "tissue_sim/scene/scene_file.h"
 #include "tissue_sim/simulation/step.h"
 #include "tissue_sim/simulation/timeline.h"
+#include "tissue_sim/study/temporary_folder.h"
 
 namespace tissue_sim {
 
@@ -54,28 +54,6 @@ double most_resident() {
     if (line.rfind("VmHWM:", 0) == 0) return 1024.0 * std::stod(line.substr(6));
   }
   return 0.0;
-}
-
-/// A folder that goes with all that is in it.
-struct TemporaryFolder {
-  fs::path path = fs::temp_directory_path() / ("tissue_sim_load_" + std::to_string(getpid()));
-  TemporaryFolder() { fs::create_directories(path); }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    fs::remove_all(path, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-};
-
-[[noreturn]] void fail(const std::string& path) {
-  throw SceneError(path + ": cannot be written, is there room in the temporary folder?");
-}
-
-void write_text(const std::string& text, const std::string& path) {
-  std::ofstream file(path, std::ios::binary);
-  file.write(text.data(), static_cast<std::streamsize>(text.size()));
-  if (!file.flush()) fail(path);
 }
 
 void append(const void* data, std::size_t size, std::string& bytes) {
@@ -192,7 +170,7 @@ void write_stl(const TriangleMesh& mesh, const std::string& path) {
 }
 
 std::vector<LoadCost> time_loading(int triangles) {
-  const TemporaryFolder folder;
+  const TemporaryFolder folder("tissue_sim_load");
   write_probe(folder.path);
   {
     const int n = std::max(1, static_cast<int>(std::lround(std::sqrt(triangles / 20.0))));

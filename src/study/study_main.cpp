@@ -5,12 +5,14 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <climits>
 #include <cstdio>
 #include <fstream>
 #include <tuple>
 
 #include "tissue_sim/scene/resource_path.h"
+#include "tissue_sim/study/stability_map.h"
 #include "tissue_sim/study/study_cases.h"
 #include "tissue_sim/study/study_report.h"
 
@@ -20,9 +22,12 @@ using namespace tissue_sim;
 
 constexpr const char* usage =
     "usage: tissue_sim_study --out DIR [--quick] [--case NAME]\n"
+    "       tissue_sim_study --out DIR --stability [--quick]\n"
     "  --out DIR    gets study.json, tables.md, accuracy.yaml and plots (SVG)\n"
     "  --quick      small meshes, under a minute\n"
-    "  --case NAME  only this one: sphere_into_block, probe_into_organ or demo_recording\n";
+    "  --case NAME  only this one: sphere_into_block, probe_into_organ or demo_recording\n"
+    "  --stability  small organs at the extremes instead: DIR gets stability.json, stability.md and pictures (PNG);\n"
+    "               status 1 with a list of the cells that are neither stable nor refused with a cure\n";
 
 const std::string case_names[] = {"sphere_into_block", "probe_into_organ", "demo_recording"};
 
@@ -30,6 +35,7 @@ struct Arguments {
   std::string out;
   std::string only;
   bool quick = false;
+  bool stability = false;
 };
 
 bool read_arguments(int argc, char** argv, Arguments& arguments) {
@@ -37,6 +43,8 @@ bool read_arguments(int argc, char** argv, Arguments& arguments) {
     const std::string word = argv[i];
     if (word == "--quick") {
       arguments.quick = true;
+    } else if (word == "--stability") {
+      arguments.stability = true;
     } else if (word == "--out" && i + 1 < argc) {
       arguments.out = argv[++i];
     } else if (word == "--case" && i + 1 < argc) {
@@ -47,6 +55,7 @@ bool read_arguments(int argc, char** argv, Arguments& arguments) {
   }
   bool known = arguments.only.empty();
   for (const std::string& name : case_names) known = known || name == arguments.only;
+  if (arguments.stability && !arguments.only.empty()) return false;
   return known && !arguments.out.empty();
 }
 
@@ -112,18 +121,39 @@ bool run(const std::vector<std::string>& words) {
 }
 
 /// By the script that stands beside this program.
-void draw_plots(const std::string& program, const std::string& out) {
-  const std::string script = program.substr(0, program.rfind('/') + 1) + "plot_study.py";
-  const std::string json = out + "/study.json";
+void draw_plots(const std::string& script_name, const std::string& json, const std::string& out) {
+  const std::string program = this_program();
+  const std::string script = program.substr(0, program.rfind('/') + 1) + script_name;
   if (access(script.c_str(), R_OK) == 0 && run({"/usr/bin/python3", script, json, "--out", out})) return;
-  std::fprintf(stderr, "tissue_sim_study: no plots; draw them with: scripts/plot_study.py %s --out %s\n", json.c_str(),
-               out.c_str());
+  std::fprintf(stderr, "tissue_sim_study: no plots; draw them with: scripts/%s %s --out %s\n", script_name.c_str(),
+               json.c_str(), out.c_str());
+}
+
+void make_folder(const std::string& out) {
+  if (mkdir(out.c_str(), 0777) == 0 || access(out.c_str(), W_OK) == 0) return;
+  throw std::runtime_error(out + ": cannot be made or written: give a folder whose parent exists");
+}
+
+/// Throws where a cell is neither stable nor refused with a cure.
+void study_stability(const Arguments& arguments) {
+  make_folder(arguments.out);
+  const std::string command =
+      std::string("tissue_sim_study --out DIR --stability") + (arguments.quick ? " --quick" : "");
+  const std::vector<StabilityRow> rows = map_stability(stability_cells(arguments.quick), stderr);
+  const std::string json = arguments.out + "/stability.json";
+  const std::string table = stability_table(rows, command);
+  write(json, stability_json(rows, command));
+  write(arguments.out + "/stability.md", table);
+  std::fputs(table.c_str(), stdout);
+  draw_plots("plot_stability.py", json, arguments.out);
+  const auto neither = std::count_if(rows.begin(), rows.end(),
+                                     [](const StabilityRow& row) { return row.outcome == Outcome::neither_of_these; });
+  if (neither == 0) return;
+  throw std::runtime_error(std::to_string(neither) + " cells are neither stable nor refused with a cure, see above");
 }
 
 void study(const Arguments& arguments) {
-  if (mkdir(arguments.out.c_str(), 0777) != 0 && access(arguments.out.c_str(), W_OK) != 0) {
-    throw std::runtime_error(arguments.out + ": cannot be made or written: give a folder whose parent exists");
-  }
+  make_folder(arguments.out);
   const std::string program = this_program();
   const std::string scene = resolve_path("package://tissue_sim/config/scenes/demo.yaml", program);
   const std::string config = scene.substr(0, scene.rfind("/scenes/"));
@@ -139,7 +169,7 @@ void study(const Arguments& arguments) {
   write(arguments.out + "/tables.md", tables);
   write(arguments.out + "/accuracy.yaml", accuracy_table(rows, command, machine()));
   std::fputs(tables.c_str(), stdout);
-  draw_plots(program, arguments.out);
+  draw_plots("plot_study.py", json, arguments.out);
 }
 
 }  // namespace
@@ -155,7 +185,7 @@ int main(int argc, char** argv) {
     return 2;
   }
   try {
-    study(arguments);
+    arguments.stability ? study_stability(arguments) : study(arguments);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "tissue_sim_study: %s\n", error.what());
     return 1;

@@ -17,7 +17,7 @@ double energy_of(const std::vector<Kind>& elements, const std::vector<Vector3>& 
 
 }  // namespace
 
-double elastic_energy(const RestShape& rest, const std::vector<Vector3>& positions) {
+double elastic_energy(const RestShape& rest, const std::vector<Vector3>& positions, std::vector<Vector3>& room) {
   double energy = energy_of(rest.distances, positions) + energy_of(rest.areas, positions);
   energy += energy_of(rest.volumes, positions);
   NeoHookeanElement::Vectors forces;
@@ -25,11 +25,15 @@ double elastic_energy(const RestShape& rest, const std::vector<Vector3>& positio
     energy += element.evaluate(gather(element, positions), forces);
   }
   if (rest.enclosed.stiffness > 0.0) {
-    std::vector<Vector3> gradient(positions.size());
-    const double c = rest.enclosed.evaluate(positions, rest.wall_triangles(), gradient);
+    const double c = rest.enclosed.evaluate(positions, rest.wall_triangles(), room);
     energy += 0.5 * rest.enclosed.stiffness * c * c;
   }
   return energy;
+}
+
+double elastic_energy(const RestShape& rest, const std::vector<Vector3>& positions) {
+  std::vector<Vector3> room(positions.size());
+  return elastic_energy(rest, positions, room);
 }
 
 }  // namespace tissue_sim

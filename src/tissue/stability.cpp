@@ -255,7 +255,7 @@ double fastest_frequency(const RestShape& shape) {
       shape, [&](const std::vector<Vector3>& x, std::vector<Vector3>& y) { add_stiffness_product(shape, x, y); }));
 }
 
-double stable_substep(const RestShape& shape, double safety) {
+double stable_substep(const RestShape& shape, double safety, double damping_safety) {
   const double omega_squared = std::pow(shape.fastest_frequency, 2);
   const std::vector<Vector3> gradient = enclosed_gradient(shape);
   const double lambda = shape.damping_time * omega_squared +
@@ -267,7 +267,7 @@ double stable_substep(const RestShape& shape, double safety) {
                         });
 
   const double a = omega_squared / (4.0 * safety * safety);
-  const double b = lambda / (2.0 * safety);
+  const double b = lambda / (2.0 * damping_safety);
   return a > 0.0 ? (std::sqrt(b * b + 4.0 * a) - b) / (2.0 * a) : 0.0;
 }
 

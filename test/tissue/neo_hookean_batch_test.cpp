@@ -132,6 +132,31 @@ TEST(NeoHookeanBatch, AgreesWithThePlainElement) {
   }
 }
 
+TEST(NeoHookeanBatch, AHundredThousandRandomTetrahedraPullAsThePlainOnes) {
+  Block block(6);
+  std::size_t tetrahedra = 0;
+  double worst = 0.0;
+  for (int round = 0; tetrahedra < 100'000; ++round) {
+    const std::vector<float> u = block.displacements(0.1 * (1 + round % 5));
+    const std::vector<Vector3> x = block.positions(u);
+    std::vector<Vector3> expected(x.size(), Vector3::Zero());
+    for (const NeoHookeanElement& element : block.elements) {
+      Vectors gradient;
+      element.evaluate(Block::corners(x, element.vertices), gradient);
+      for (std::size_t c = 0; c < 4; ++c) expected[static_cast<std::size_t>(element.vertices[c])] -= gradient[c];
+    }
+    double size = 0.0;
+    for (const Vector3& f : expected) size = std::max(size, f.norm());
+    const std::vector<float> forces = block.forces(u);
+    for (std::size_t v = 0; v < x.size(); ++v) {
+      worst = std::max(worst, (vector_at(forces, v) - expected[v]).norm() / size);
+    }
+    tetrahedra += block.elements.size();
+  }
+  EXPECT_LT(worst, 1e-5) << "in floats, of the largest force";
+  testing::Test::RecordProperty("worst_per_billion", static_cast<int>(1e9 * worst));
+}
+
 /// Formed as 1 + H, the deformation gradient would lose the stress of such a strain to 1e-1.
 TEST(NeoHookeanBatch, SmallStrainsKeepTheirDigits) {
   for (const double strain : {1e-3, 1e-6, 1e-9}) {

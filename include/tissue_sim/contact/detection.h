@@ -89,7 +89,7 @@ void detect(const OrganSurface& organ, const InstrumentSurface& instrument, cons
 
 /// closest_feature() of an organ vertex, from where the last one was found.
 ClosestFeature closest_feature_of(const InstrumentSurface& instrument, Detection& detection, int vertex,
-                                  double reach = std::numeric_limits<double>::max());
+                                  double reach = std::numeric_limits<double>::infinity());
 
 /// Position of an organ vertex in the tip frame.
 const Vector3& local_position(Detection& detection, const OrganSurface& organ, const Pose& pose, int vertex);

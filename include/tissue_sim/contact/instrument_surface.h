@@ -52,6 +52,6 @@ struct ClosestFeature {
 /// what is farther than `reach` (m) from the surface. `guess` is a triangle that may well be the closest, or -1: it
 /// changes how long the search takes and not what it finds.
 ClosestFeature closest_feature(const InstrumentSurface& surface, const Vector3& p,
-                               double reach = std::numeric_limits<double>::max(), int guess = -1);
+                               double reach = std::numeric_limits<double>::infinity(), int guess = -1);
 
 }  // namespace tissue_sim

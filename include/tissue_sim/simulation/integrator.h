@@ -10,6 +10,10 @@ namespace tissue_sim {
 /// been `stiffening` (see below; 0: has no contact); 1 where nothing is integrated.
 int substeps_for(const RestShape& rest, double duration, double stiffening = 0.0);
 
+/// The most stiffening that more substeps are taken for, four times as many: beyond, it is a matter of the health
+/// check, which begins again with as many.
+constexpr double most_stiffening = 11.2;
+
 /// How much stiffer than the stiffest tetrahedron at rest the stiffest at a contact is now, as squared frequency. Where
 /// a thin instrument presses deep into small tetrahedra that is far beyond what the substep at rest is stable for.
 /// `tetrahedra_at` lists the tetrahedra at each vertex.

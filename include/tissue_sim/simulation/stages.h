@@ -15,7 +15,9 @@ struct StepContext {
   double dt = 0.0;  ///< s, of the substep
   int substep = 1;  ///< the first is 1
   int substeps = 1;
-  bool slept = false;  ///< the organ was asleep when the step began
+  bool jumps = false;     ///< an instrument is elsewhere at once: not swept
+  bool ran_away = false;  ///< in this substep: what comes after it would only overflow
+  bool slept = false;     ///< the organ was asleep when the step began
 
   const OrganModel& model() const { return world.organs[organ]; }
   OrganWorkspace& work() { return workspace.organs[organ]; }
@@ -36,6 +38,9 @@ struct StepContext {
 
 void begin_report(const World& world, const Motion& motion, StepReport& report);
 
+/// Puts the last good state of the organ back where what it remembers is not numbers: the step would read it.
+void recall(StepContext& context);
+
 /// As many as the elements need, and as many as keep an instrument near the organ from moving farther than the motion
 /// limit in one.
 int count_substeps(StepContext& context);
@@ -49,7 +54,8 @@ void respond(StepContext& context);
 void deform(StepContext& context);
 void bear(StepContext& context);
 
-/// Puts the last good state of the organ back, at rest, when a number is not finite or a vertex has run away.
+/// Puts the last good state of the organ back, at rest, when a number is not finite or a vertex has run away. What the
+/// step works on is looked at in every step, the rest of a large organ in turn.
 void check_health(StepContext& context);
 
 void report_contacts(StepContext& context);

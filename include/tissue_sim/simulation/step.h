@@ -40,6 +40,8 @@ struct OrganWorkspace {
   std::vector<int> pressing_of;  ///< per place, into the state's pressing; -1 between two uses
   DescentRoom descent;
   OrganState last_good;
+  int bad_steps = 0;       ///< in a row
+  std::uint64_t turn = 0;  ///< of the vertices that the health check looks at
 
   std::vector<OrganContact> contacts;  ///< of the step, one a place that was pressed in any of its substeps
   std::vector<int> contact_of;         ///< per place, into contacts, where contact_step is the current one

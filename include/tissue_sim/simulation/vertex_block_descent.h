@@ -13,6 +13,7 @@ Incidence build_incidence(const RestShape& rest);
 struct DescentRoom {
   std::vector<Vector3> start;     ///< m, positions at the start of the step
   std::vector<Vector3> inertial;  ///< m, where the vertex would go without elements
+  std::vector<Vector3> scratch;   ///< for what is computed for all vertices and of no use
   std::vector<int> first_of;      ///< into `pressing`, the first of the vertex's; -1: none
   /// m, from rest, + damping_time velocities: of these tetrahedra make their forces. Empty where there are none.
   std::vector<Eigen::Vector4f> displacements;

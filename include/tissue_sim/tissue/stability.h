@@ -23,7 +23,12 @@ double fastest_frequency(const RestShape& shape);
 /// The substep (s) at which the explicit integrator stays stable, `safety` times the bound. Stability of the symplectic
 /// step needs (dt omega / 2)^2 + dt lambda / 2 < 1, where omega^2 and lambda are the largest eigenvalues of stiffness
 /// and damping over mass, taken at rest by power iteration; omega is the shape's `fastest_frequency`.
-double stable_substep(const RestShape& shape, double safety);
+/// Damping may have a bound of its own, `damping_safety`: where elements may become stiffer before they are softened,
+/// their damping grows with them, and counts whole where a frequency counts by its root.
+double stable_substep(const RestShape& shape, double safety, double damping_safety);
+inline double stable_substep(const RestShape& shape, double safety) {
+  return stable_substep(shape, safety, safety);
+}
 
 /// The largest k sum |grad_i C|^2 / m_i of an element at the given positions, 1/s^2: the square of the frequency at
 /// which the fastest element alone would vibrate. Areas and volumes stiffen when they are stretched.
