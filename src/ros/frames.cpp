@@ -1,11 +1,15 @@
 #include "tissue_sim/ros/frames.h"
 
+#include <ros/serialization.h>
 #include <tf2/exceptions.h>
 
 #include "tissue_sim/ros/messages.h"
 
 namespace tissue_sim {
 namespace {
+
+/// Of one transform whose frames have no name: header 16, name of the child 4, seven numbers of 8.
+constexpr std::size_t least_transform_bytes = 76;
 
 // tf2 refuses the leading slash that older drivers still write.
 std::string without_slash(const std::string& frame) {
@@ -45,6 +49,21 @@ bool into_scene_frame(const tf2::BufferCore& transforms, const std::string& scen
   pose.in_scene.pose.position = to_scene.apply(pose.in_scene.pose.position);
   pose.in_scene.pose.orientation = to_scene.orientation * pose.in_scene.pose.orientation;
   pose.frame_to_scene = to_scene.orientation;
+  return true;
+}
+
+bool deserialize_transforms(std::vector<std::uint8_t>& bytes, tf2_msgs::TFMessage& message) {
+  const auto length = static_cast<std::uint32_t>(bytes.size());
+  std::uint32_t announced = 0;
+  try {
+    ros::serialization::IStream counts(bytes.data(), length);
+    counts.next(announced);
+    if (announced > bytes.size() / least_transform_bytes) return false;
+    ros::serialization::IStream stream(bytes.data(), length);
+    ros::serialization::deserialize(stream, message);
+  } catch (const ros::serialization::StreamOverrunException&) {
+    return false;
+  }
   return true;
 }
 

@@ -2,10 +2,12 @@
 
 #include <geometry_msgs/PoseStamped.h>
 #include <tf2/buffer_core.h>
+#include <tf2_msgs/TFMessage.h>
 
 #include <cstdint>
 #include <deque>
 #include <string>
+#include <vector>
 
 #include "tissue_sim/simulation/timeline.h"
 
@@ -22,6 +24,10 @@ struct FramedPose {
 /// no such transform (yet). Without a change of frame no transform is looked up at all.
 bool into_scene_frame(const tf2::BufferCore& transforms, const std::string& scene_frame,
                       const geometry_msgs::PoseStamped& message, FramedPose& pose, std::string& why);
+
+/// Transforms as they stand in a recording. False where the bytes end too early, or where they announce more transforms
+/// than they can hold: roscpp makes room for all that are announced before it reads the first. The bytes stay as they are.
+bool deserialize_transforms(std::vector<std::uint8_t>& bytes, tf2_msgs::TFMessage& message);
 
 /// The frames that one instrument's poses came in, until the steps have caught up with them.
 class FrameHistory {
