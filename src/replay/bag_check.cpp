@@ -91,7 +91,8 @@ class Bytes {
 
   std::string read(std::uint64_t at, std::uint64_t length) {
     if (at > size_ || length > size_ - at) fail(at, "reaches past the end");
-    if (!memory_.empty()) return {memory_.begin() + static_cast<long>(at), memory_.begin() + static_cast<long>(at + length)};
+    if (!memory_.empty())
+      return {memory_.begin() + static_cast<long>(at), memory_.begin() + static_cast<long>(at + length)};
     std::string bytes(length, '\0');
     file_.seekg(static_cast<std::streamoff>(at));
     if (!file_.read(&bytes[0], static_cast<std::streamsize>(length))) throw Fault("it cannot be read to its end");
@@ -181,9 +182,9 @@ void check_contents(Bytes& file, const Chunk& chunk) {
 /// The records of a bag, told apart.
 struct Outline {
   Record file;
-  std::map<std::uint64_t, Chunk> chunks;  ///< by place
+  std::map<std::uint64_t, Chunk> chunks;                  ///< by place
   std::map<std::uint64_t, std::set<std::string>> topics;  ///< of each connection; liars name it twice
-  std::vector<Record> tail;  ///< from where the file header says that the summary begins
+  std::vector<Record> tail;                               ///< from where the file header says that the summary begins
 };
 
 Outline read_outline(Bytes& file, const Record& header) {

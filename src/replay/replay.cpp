@@ -88,7 +88,7 @@ void read_transforms(rosbag::Bag& bag, const std::string& path, tf2::BufferCore&
       throw std::runtime_error(path + ": a message on " + instance.getTopic() + " is damaged (it is cut short)");
     }
     const bool is_static = without_slash(instance.getTopic()) == "tf_static";
-    for (const auto& transform : message.transforms) transforms.setTransform(transform, "bag", is_static);
+    for (const auto& transform : message.transforms) give_transform(transform, "bag", is_static, transforms);
   }
 }
 
@@ -304,10 +304,7 @@ class Replay {
 
 std::uint64_t ReplaySummary::poses_dropped() const {
   std::uint64_t dropped = poses_missing_transform + counters.poses_superseded;
-  for (const PoseVerdict verdict :
-       {PoseVerdict::zero_stamp, PoseVerdict::non_finite, PoseVerdict::zero_quaternion, PoseVerdict::stale}) {
-    dropped += counters.poses[static_cast<std::size_t>(verdict)];
-  }
+  for (const PoseVerdict verdict : dropped_verdicts) dropped += counters.poses[static_cast<std::size_t>(verdict)];
   return dropped;
 }
 

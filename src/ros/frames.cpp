@@ -3,6 +3,8 @@
 #include <ros/serialization.h>
 #include <tf2/exceptions.h>
 
+#include <stdexcept>
+
 #include "tissue_sim/ros/messages.h"
 
 namespace tissue_sim {
@@ -40,7 +42,7 @@ bool into_scene_frame(const tf2::BufferCore& transforms, const std::string& scen
     to_scene.position = {found.translation.x, found.translation.y, found.translation.z};
     to_scene.orientation =
         Eigen::Quaterniond(found.rotation.w, found.rotation.x, found.rotation.y, found.rotation.z).normalized();
-  } catch (const tf2::TransformException& error) {
+  } catch (const std::runtime_error& error) {  // tf2's, and ros::Time has one of its own
     why = "no transform from \"" + source + "\" to \"" + target + "\" (" + error.what() +
           "): publish it, or give the scene the frame of the poses";
     return false;
@@ -65,6 +67,14 @@ bool deserialize_transforms(std::vector<std::uint8_t>& bytes, tf2_msgs::TFMessag
     return false;
   }
   return true;
+}
+
+bool give_transform(const geometry_msgs::TransformStamped& transform, const std::string& authority, bool is_static,
+                    tf2::BufferCore& transforms) {
+  // In seconds, rounded: what comes within a second of the end is refused too.
+  const double kept_until = transform.header.stamp.toSec() + transforms.getCacheLength().toSec();
+  if (kept_until > ros::TIME_MAX.toSec() - 1.0) return false;
+  return transforms.setTransform(transform, authority, is_static);
 }
 
 const FramedPose* FrameHistory::at(std::int64_t stamp) {

@@ -8,8 +8,11 @@
 #include <array>
 #include <assimp/Importer.hpp>
 #include <cctype>
+#include <fstream>
+#include <iterator>
 #include <set>
 
+#include "dae_check.h"
 #include "ply_check.h"
 #include "tissue_sim/scene/scene.h"
 
@@ -21,6 +24,13 @@ constexpr double flat_ratio = 1e-9;
 
 [[noreturn]] void fail(const std::string& path, const std::string& problem) {
   throw SceneError(path + ": " + problem);
+}
+
+/// What comes from the file may hold anything.
+std::string one_line(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < 32 || c > 126; }, ' ');
+  return text;
 }
 
 void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent, const Vector3& scale,
@@ -101,6 +111,17 @@ double size_of(const TriangleMesh& mesh) {
   return (high - low).norm();
 }
 
+const aiScene* import_dae(const std::string& path, Assimp::Importer& importer) {
+  std::ifstream file(path, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  try {
+    text = checked_dae(std::move(text));
+  } catch (const std::runtime_error& error) {
+    throw SceneError(path + ":" + one_line(error.what()) + ", export it again");
+  }
+  return importer.ReadFileFromMemory(text.data(), text.size(), 0, "dae");
+}
+
 template <typename Unwanted>
 int drop_triangles(TriangleMesh& mesh, Unwanted unwanted) {
   const auto end = std::remove_if(mesh.triangles.begin(), mesh.triangles.end(), unwanted);
@@ -176,12 +197,9 @@ TriangleMesh read_mesh(const std::string& path, const Vector3& scale) {
   if (!missing.empty()) fail(path, "has not " + missing + ", export it again");
   Assimp::Importer importer;
   importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
-  const aiScene* scene = importer.ReadFile(path, 0);
+  const aiScene* scene = ending == ".dae" ? import_dae(path, importer) : importer.ReadFile(path, 0);
   if (!scene || !scene->mRootNode) {
-    std::string why = importer.GetErrorString();
-    std::replace_if(
-        why.begin(), why.end(), [](unsigned char c) { return c < 32 || c > 126; }, ' ');
-    fail(path, "cannot be read as a mesh (" + why + "), export it again");
+    fail(path, "cannot be read as a mesh (" + one_line(importer.GetErrorString()) + "), export it again");
   }
   const int polygons = count_polygons(path, *scene);
   if (polygons > 0) scene = importer.ApplyPostProcessing(aiProcess_Triangulate);

@@ -12,8 +12,8 @@ namespace tissue_sim {
 namespace {
 
 const std::map<std::string, Door> doors = {{"scene", enter_scene}, {"urdf", enter_urdf}, {"obj", enter_obj},
-                                            {"stl", enter_stl},     {"ply", enter_ply},   {"dae", enter_dae},
-                                            {"msh", enter_msh},     {"bag", enter_bag},   {"messages", enter_messages}};
+                                           {"stl", enter_stl},     {"ply", enter_ply},   {"dae", enter_dae},
+                                           {"msh", enter_msh},     {"bag", enter_bag},   {"messages", enter_messages}};
 
 std::string bytes_of(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);

@@ -16,7 +16,7 @@
 namespace tissue_sim {
 namespace {
 
-constexpr double bound = 10.0;   ///< m: the organ is 6 cm across, at the origin
+constexpr double bound = 10.0;  ///< m: the organ is 6 cm across, at the origin
 
 /// An organ that only feels contact, and long steps: the time goes into what is read.
 Scene ball_scene() {
@@ -127,7 +127,9 @@ std::string enter_messages(const std::string& bytes) {
         refused = "transforms are cut short";
         continue;
       }
-      for (const auto& transform : message.transforms) transforms.setTransform(transform, "fuzz", false);
+      for (const auto& transform : message.transforms) {
+        if (!give_transform(transform, "fuzz", false, transforms)) refused = "a transform of no use";
+      }
       continue;
     }
     geometry_msgs::PoseStamped message;
