@@ -8,6 +8,7 @@
 #include <fstream>
 #include <map>
 
+#include "one_line.h"
 #include "tissue_sim/geometry/primitives.h"
 #include "tissue_sim/scene/mesh_file.h"
 #include "tissue_sim/scene/resource_path.h"
@@ -131,7 +132,7 @@ urdf::ModelInterfaceSharedPtr parse(const std::string& path) {
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   if (!file && text.empty()) throw SceneError(path + ": cannot be read, check that it is a file you may read");
   const std::string unbalanced = unbalanced_tag(text);
-  if (!unbalanced.empty()) throw SceneError(path + ":" + unbalanced + ", mend the XML");
+  if (!unbalanced.empty()) throw SceneError(path + ":" + one_line(unbalanced) + ", mend the XML");
   ParserMessages messages;
   urdf::ModelInterfaceSharedPtr model;
   try {
@@ -141,7 +142,8 @@ urdf::ModelInterfaceSharedPtr parse(const std::string& path) {
   }
   // urdfdom goes on without what it cannot read: the tip could be missing.
   if (!model || !model->getRoot() || !messages.text.empty()) {
-    throw SceneError(path + ": is not a URDF: " + (messages.text.empty() ? "it has no <robot>" : messages.text));
+    throw SceneError(path +
+                     ": is not a URDF: " + (messages.text.empty() ? "it has no <robot>" : one_line(messages.text)));
   }
   return model;
 }
@@ -155,12 +157,12 @@ std::vector<InstrumentPart> load_instrument(const std::string& path, const std::
   const auto tip = poses.find(tip_link);
   if (tip == poses.end()) {
     std::string names;
-    for (const auto& link : poses) names += (names.empty() ? "" : ", ") + link.first;
+    for (const auto& link : poses) names += (names.empty() ? "" : ", ") + one_line(link.first);
     throw SceneError(path + ": there is no link '" + tip_link + "' to be the tip_link, there are: " + names);
   }
   std::vector<InstrumentPart> parts;
   for (const auto& [name, pose] : poses) {
-    const std::string where = path + ": link '" + name + "': ";
+    const std::string where = path + ": link '" + one_line(name) + "': ";
     bool fell_back = false;
     const std::vector<Shape> shapes = shapes_of(*model->getLink(name), fell_back);
     if (fell_back && !shapes.empty()) warnings.push_back(where + "has no <collision>, its <visual> is used");

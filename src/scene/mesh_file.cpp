@@ -13,6 +13,7 @@
 #include <set>
 
 #include "dae_check.h"
+#include "one_line.h"
 #include "ply_check.h"
 #include "tissue_sim/scene/scene.h"
 
@@ -24,13 +25,6 @@ constexpr double flat_ratio = 1e-9;
 
 [[noreturn]] void fail(const std::string& path, const std::string& problem) {
   throw SceneError(path + ": " + problem);
-}
-
-/// What comes from the file may hold anything.
-std::string one_line(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](unsigned char c) { return c < 32 || c > 126; }, ' ');
-  return text;
 }
 
 void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent, const Vector3& scale,

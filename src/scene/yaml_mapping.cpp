@@ -7,18 +7,13 @@
 #include <numeric>
 #include <sstream>
 
+#include "one_line.h"
+
 namespace tissue_sim {
 namespace {
 
 std::string at(const std::string& file, const YAML::Mark& mark) {
   return file + ":" + std::to_string(mark.line + 1) + ":" + std::to_string(mark.column + 1) + ": ";
-}
-
-/// Values and messages from elsewhere may hold line breaks; an error is one line.
-std::string one_line(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](unsigned char c) { return c < 32 || c == 127; }, ' ');
-  return text;
 }
 
 /// What stands in the file, fit for one line of an error.
