@@ -55,6 +55,7 @@ bool into_scene_frame(const tf2::BufferCore& transforms, const std::string& scen
 }
 
 bool deserialize_transforms(std::vector<std::uint8_t>& bytes, tf2_msgs::TFMessage& message) {
+  if (bytes.empty()) return false;  // roscpp counts on from where they begin, which is nowhere
   const auto length = static_cast<std::uint32_t>(bytes.size());
   std::uint32_t announced = 0;
   try {

@@ -1,6 +1,7 @@
 #include <geometry_msgs/PoseStamped.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdlib>
@@ -53,7 +54,8 @@ struct Shot {
   bool off_unit = false;                     ///< its quaternion is to be normalised, and counted
 };
 
-/// Poses in and around the organ, most a millisecond after the one before; every third is broken in one way.
+/// Poses of an instrument that wanders in and out of the organ, most a millisecond after the one before; every third is
+/// broken in one way.
 class Gun {
  public:
   explicit Gun(unsigned seed) : random_(seed) {}
@@ -64,10 +66,12 @@ class Gun {
     std::int64_t stamp = newest + ms;
     auto& p = shot.message.pose.position;
     auto& q = shot.message.pose.orientation;
-    p.x = real(-0.08, 0.08);
-    p.y = real(-0.08, 0.08);
-    p.z = real(-0.08, 0.08);
-    Eigen::Quaterniond unit(real(-1, 1), real(-1, 1), real(-1, 1), real(0.1, 1));
+    for (double& x : place_) x = std::clamp(x + real(-0.003, 0.003), -0.06, 0.06);
+    p.x = place_[0];
+    p.y = place_[1];
+    p.z = place_[2];
+    Eigen::Quaterniond unit(1.0, real(-0.1, 0.1), real(-0.1, 0.1), real(-0.1, 0.1));
+    if (roll(100) == 0) unit = Eigen::Quaterniond(real(-1, 1), real(-1, 1), real(-1, 1), real(0.1, 1));
     unit.normalize();
     double length = 1.0;
     if (roll(3) == 0) breakage(shot, p, stamp, newest, length);
@@ -138,7 +142,7 @@ class Gun {
         stamp = std::max<std::int64_t>(1, newest - roll(2 * second));
         break;
       case 13:
-        stamp = newest + roll(50 * ms);
+        stamp = newest + roll(5 * ms);
         break;
       default:
         stamp = 1 + roll(4'000'000'000 * second);  // any day of 130 years
@@ -150,6 +154,7 @@ class Gun {
   double real(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random_); }
 
   std::mt19937_64 random_;
+  std::array<double, 3> place_{0.0, 0.0, 0.06};
   bool bad_rotation_ = false;
 };
 

@@ -151,7 +151,9 @@ std::string enter_messages(const std::string& bytes) {
       continue;
     }
     frames.add(pose);
-    while (timeline.step()) require_sound_output(scene, timeline, frames);
+    while (timeline.step()) {
+      if (timeline.report().pose_reached) require_sound_output(scene, timeline, frames);
+    }
   }
   return refused;
 }

@@ -34,7 +34,7 @@ const Case cases[] = {
     {"no_time_step", 1, "time_step", "is missing, add it"},
     {"time_step_zero", 2, "time_step", "from 1e-6 to 0.1, in seconds"},
     {"time_step_in_ms", 2, "time_step", "from 1e-6 to 0.1, in seconds"},
-    {"time_step_nan", 2, "time_step", "is '.nan', allowed is a number above 0"},
+    {"time_step_nan", 2, "time_step", "from 1e-6 to 0.1, in seconds"},
     {"time_step_text", 2, "time_step", "allowed is a number"},
     {"time_step_unit", 2, "time_step", "allowed is a number"},
     {"substeps_half", 3, "max_substeps", "a whole number from 1 to 10000"},

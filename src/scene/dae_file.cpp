@@ -1,5 +1,3 @@
-#include "dae_check.h"
-
 #include <algorithm>
 #include <charconv>
 #include <map>
@@ -7,6 +5,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "mesh_formats.h"
 #include "xml_tags.h"
 
 namespace tissue_sim {
@@ -250,7 +249,7 @@ class DaeCheck {
 
 }  // namespace
 
-std::string checked_dae(std::string text) {
+std::string plain_dae(std::string text) {
   return DaeCheck(std::move(text)).run();
 }
 
