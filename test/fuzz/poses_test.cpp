@@ -19,7 +19,7 @@ constexpr std::int64_t ms = 1'000'000;
 constexpr std::int64_t second = 1'000'000'000;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double bound = 1.2;        // m; the health check lets no vertex go farther than ten times the organ's 10 cm
+constexpr double bound = 1.8;  // m; the health check lets no vertex go farther than ten times the 17 cm of the organ
 constexpr double force_bound = 1e6;  // N
 constexpr double denormal = 1e-310;
 
