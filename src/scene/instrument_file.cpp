@@ -172,9 +172,9 @@ std::vector<InstrumentPart> load_instrument(const std::string& path, const std::
       try {
         piece = tessellate(*shape.geometry, path, where, mended);
       } catch (const SceneError& error) {
-        throw SceneError(shape.geometry->type == urdf::Geometry::MESH ? where + error.what() : error.what());
+        throw SceneError(one_line(shape.geometry->type == urdf::Geometry::MESH ? where + error.what() : error.what()));
       }
-      for (const std::string& warning : mended) warnings.push_back(where + warning);
+      for (const std::string& warning : mended) warnings.push_back(one_line(where + warning));
       if (piece.mesh.triangles.empty()) {
         warnings.push_back(where + "a primitive of zero size is skipped");
         continue;
