@@ -20,11 +20,20 @@ constexpr int longest_chain = 1000;
 /// Values that a vertex has in one list: positions, normals, several textures.
 constexpr std::uint64_t most_offsets = 64;
 
-const std::set<std::string> not_needed = {
-    "library_animations",     "library_animation_clips", "library_cameras",      "library_effects",
-    "library_images",         "library_lights",          "library_materials",    "library_physics_materials",
-    "library_physics_models", "library_physics_scenes",  "library_force_fields", "extra",
-    "bind_material"};
+const std::set<std::string> not_needed = {"library_animations",
+                                          "library_controllers",
+                                          "library_animation_clips",
+                                          "library_cameras",
+                                          "library_effects",
+                                          "library_images",
+                                          "library_lights",
+                                          "library_materials",
+                                          "library_physics_materials",
+                                          "library_physics_models",
+                                          "library_physics_scenes",
+                                          "library_force_fields",
+                                          "extra",
+                                          "bind_material"};
 
 /// Kinds of primitives, and how many vertices a list of indices needs at least.
 const std::map<std::string, std::uint64_t> primitives = {{"triangles", 0}, {"polylist", 0},   {"polygons", 0},
@@ -114,7 +123,7 @@ class DaeCheck {
 
   void open(const XmlTag& tag) {
     const std::string id(attribute(text_, tag, "id"));
-    if (tag.name == "instance_controller" || tag.name == "library_controllers") {
+    if (tag.name == "instance_controller") {
       fail(tag, "moves the mesh by a skeleton: export it without one");
     } else if (tag.name == "skew") {
       fail(tag, "is not read: apply the transforms of the mesh");
