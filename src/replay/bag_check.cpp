@@ -120,9 +120,17 @@ class Bytes {
   std::uint64_t size_ = 0;
 };
 
+/// Where the messages of one connection are in a chunk. A long recording has millions of these.
+struct Index {
+  std::uint64_t at = 0;
+  std::uint64_t connection = 0;
+  std::uint64_t data = 0;
+  std::uint64_t length = 0;
+};
+
 struct Chunk {
   Record record;
-  std::vector<Record> indices;  ///< that stand behind it
+  std::vector<Index> indices;  ///< that stand behind it
 };
 
 std::string without_slash(const std::string& topic) {
@@ -171,7 +179,7 @@ void check_contents(Bytes& file, const Chunk& chunk) {
     if (record.op == op_message) messages.insert(at);
     at = record.end();
   }
-  for (const Record& index : chunk.indices) {
+  for (const Index& index : chunk.indices) {
     const std::string entries = file.read(index.data, index.length);
     for (std::size_t entry = 0; entry < entries.size(); entry += bytes_of_entry) {
       if (messages.count(whole(&entries[entry + 8], 4)) == 0) fail(index.at, "points to a message that is not there");
@@ -197,8 +205,7 @@ Outline read_outline(Bytes& file, const Record& header) {
     if (record.op == op_index) {
       if (outline.chunks.empty()) fail(at, "is an index before any chunk");
       if (record.number("count", 4) * bytes_of_entry != record.length) fail(at, "is not as long as its count says");
-      record.number("conn", 4);
-      outline.chunks.rbegin()->second.indices.push_back(record);
+      outline.chunks.rbegin()->second.indices.push_back({at, record.number("conn", 4), record.data, record.length});
     }
     if (record.op == op_connection) {
       const auto topic = record.fields.find("topic");
@@ -235,8 +242,8 @@ void check_summary(Bytes& file, const Outline& outline) {
 }
 
 bool holds_any(const Chunk& chunk, const Outline& outline, const std::set<std::string>& topics) {
-  for (const Record& index : chunk.indices) {
-    const auto named = outline.topics.find(index.number("conn", 4));
+  for (const Index& index : chunk.indices) {
+    const auto named = outline.topics.find(index.connection);
     if (named == outline.topics.end()) continue;
     for (const std::string& topic : named->second) {
       if (topics.count(topic) > 0) return true;
