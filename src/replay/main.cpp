@@ -90,8 +90,7 @@ void print(const ReplaySummary& s, const std::vector<ModelChoice>& choices) {
               s.sim_seconds);
   std::printf("poses              %llu used, %llu dropped", static_cast<unsigned long long>(s.poses_used),
               static_cast<unsigned long long>(s.poses_dropped()));
-  for (const PoseVerdict verdict :
-       {PoseVerdict::zero_stamp, PoseVerdict::non_finite, PoseVerdict::zero_quaternion, PoseVerdict::stale}) {
+  for (const PoseVerdict verdict : tissue_sim::dropped_verdicts) {
     if (count(s, verdict) > 0) {
       std::printf("; %s %llu", to_string(verdict), static_cast<unsigned long long>(count(s, verdict)));
     }
@@ -170,7 +169,9 @@ void write_json(const ReplaySummary& s, const std::vector<ModelChoice>& choices,
       << "  \"poses_used\": " << s.poses_used << ",\n"
       << "  \"poses_dropped\": " << s.poses_dropped() << ",\n"
       << "  \"dropped_zero_stamp\": " << count(s, PoseVerdict::zero_stamp) << ",\n"
+      << "  \"dropped_late_stamp\": " << count(s, PoseVerdict::late_stamp) << ",\n"
       << "  \"dropped_non_finite\": " << count(s, PoseVerdict::non_finite) << ",\n"
+      << "  \"dropped_too_far\": " << count(s, PoseVerdict::too_far) << ",\n"
       << "  \"dropped_zero_quaternion\": " << count(s, PoseVerdict::zero_quaternion) << ",\n"
       << "  \"dropped_stale\": " << count(s, PoseVerdict::stale) << ",\n"
       << "  \"dropped_missing_transform\": " << s.poses_missing_transform << ",\n"

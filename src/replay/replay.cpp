@@ -10,7 +10,9 @@
 #include <cstdio>
 #include <fstream>
 #include <map>
+#include <set>
 
+#include "bag_check.h"
 #include "tissue_sim/ros/frames.h"
 #include "tissue_sim/ros/messages.h"
 
@@ -23,13 +25,20 @@ std::string without_slash(const std::string& topic) {
   return !topic.empty() && topic[0] == '/' ? topic.substr(1) : topic;
 }
 
-void open_to_read(rosbag::Bag& bag, const std::string& path) {
+const std::vector<std::string> transform_topics{"/tf", "tf", "/tf_static", "tf_static"};
+
+void open_to_read(rosbag::Bag& bag, const Scene& scene, const std::string& path) {
   if (!std::ifstream(path)) throw std::runtime_error(path + ": cannot be read; give the path of a bag file");
+  std::set<std::string> topics;
+  for (const std::string& topic : transform_topics) topics.insert(without_slash(topic));
+  for (const Instrument& instrument : scene.instruments) topics.insert(without_slash(instrument.pose_topic));
+  const std::string fault = fault_in_bag(path, topics);
+  if (!fault.empty()) throw std::runtime_error(path + ": not a bag that can be read (" + fault + ")");
   try {
     bag.open(path, rosbag::bagmode::Read);
   } catch (const rosbag::BagUnindexedException&) {
     throw std::runtime_error(path + ": the bag has no index (its recording was cut off); run: rosbag reindex " + path);
-  } catch (const rosbag::BagException& error) {
+  } catch (const std::exception& error) {  // ros::Time has exceptions of its own
     throw std::runtime_error(path + ": not a bag that can be read (" + error.what() + ")");
   }
 }
@@ -66,19 +75,28 @@ std::vector<std::string> find_topics(const Scene& scene, const rosbag::Bag& bag,
 }
 
 /// All transforms at once, before the first pose: one that the node would have waited for is then there too.
-void read_transforms(rosbag::Bag& bag, tf2::BufferCore& transforms) {
-  rosbag::View view(bag, rosbag::TopicQuery(std::vector<std::string>{"/tf", "tf", "/tf_static", "tf_static"}));
+void read_transforms(rosbag::Bag& bag, const std::string& path, tf2::BufferCore& transforms) {
+  rosbag::View view(bag, rosbag::TopicQuery(transform_topics));
+  std::vector<std::uint8_t> bytes;
   for (const rosbag::MessageInstance& instance : view) {
-    const auto message = instance.instantiate<tf2_msgs::TFMessage>();
-    if (!message) continue;
+    if (instance.getMD5Sum() != ros::message_traits::md5sum<tf2_msgs::TFMessage>()) continue;
+    bytes.resize(instance.size());
+    ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+    instance.write(stream);
+    tf2_msgs::TFMessage message;
+    if (!deserialize_transforms(bytes, message)) {
+      throw std::runtime_error(path + ": a message on " + instance.getTopic() + " is damaged (it is cut short)");
+    }
     const bool is_static = without_slash(instance.getTopic()) == "tf_static";
-    for (const auto& transform : message->transforms) transforms.setTransform(transform, "bag", is_static);
+    for (const auto& transform : message.transforms) give_transform(transform, "bag", is_static, transforms);
   }
 }
 
+/// How long tf2 has to remember: all of the bag, and no longer than a ros::Duration can say (68 years).
 ros::Duration duration(rosbag::Bag& bag) {
   rosbag::View view(bag);
-  return view.size() > 0 ? view.getEndTime() - view.getBeginTime() : ros::Duration(0.0);
+  if (view.size() == 0) return ros::Duration(0.0);
+  return ros::Duration(std::min(view.getEndTime().toSec() - view.getBeginTime().toSec(), 2e9));
 }
 
 double percentile(std::vector<double> values, double fraction) {
@@ -146,10 +164,10 @@ class Replay {
 
   ReplaySummary run() {
     rosbag::Bag input;
-    open_to_read(input, options_.input);
+    open_to_read(input, scene_, options_.input);
     const std::vector<std::string> topics = find_topics(scene_, input, options_.input);
     tf2::BufferCore transforms(duration(input) + ros::Duration(10.0));
-    read_transforms(input, transforms);
+    read_transforms(input, options_.input, transforms);
 
     OutputBag output(options_.output);
     output_ = &output;
@@ -286,10 +304,7 @@ class Replay {
 
 std::uint64_t ReplaySummary::poses_dropped() const {
   std::uint64_t dropped = poses_missing_transform + counters.poses_superseded;
-  for (const PoseVerdict verdict :
-       {PoseVerdict::zero_stamp, PoseVerdict::non_finite, PoseVerdict::zero_quaternion, PoseVerdict::stale}) {
-    dropped += counters.poses[static_cast<std::size_t>(verdict)];
-  }
+  for (const PoseVerdict verdict : dropped_verdicts) dropped += counters.poses[static_cast<std::size_t>(verdict)];
   return dropped;
 }
 

@@ -43,6 +43,10 @@ const char* cure(int cause) {
       return "a pose has a value that is not finite and is dropped: look at its source";
     case static_cast<int>(PoseVerdict::zero_quaternion):
       return "a pose has a zero quaternion and is dropped: write orientation.w = 1 for no rotation";
+    case static_cast<int>(PoseVerdict::late_stamp):
+      return "a pose is stamped in the year 2106 and is dropped: look at the clock of its source";
+    case static_cast<int>(PoseVerdict::too_far):
+      return "a pose is farther than 1 km from the scene and is dropped: write metres, and look at the transforms";
     case static_cast<int>(PoseVerdict::stale):
       return "a pose is stamped no later than the one before and is dropped: send poses in the order of their stamps";
     default:
@@ -281,8 +285,7 @@ void Node::publish_diagnostics() {
   add_value(status, "poses_used", count(PoseVerdict::used) + count(PoseVerdict::new_run));
   add_value(status, "new_runs", count(PoseVerdict::new_run));
   std::uint64_t drops = missing_transforms_;
-  for (const PoseVerdict verdict :
-       {PoseVerdict::zero_stamp, PoseVerdict::non_finite, PoseVerdict::zero_quaternion, PoseVerdict::stale}) {
+  for (const PoseVerdict verdict : dropped_verdicts) {
     std::string cause = to_string(verdict);
     std::replace_if(
         cause.begin(), cause.end(), [](char c) { return c == ' ' || c == '-'; }, '_');

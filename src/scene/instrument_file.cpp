@@ -8,9 +8,11 @@
 #include <fstream>
 #include <map>
 
+#include "one_line.h"
 #include "tissue_sim/geometry/primitives.h"
 #include "tissue_sim/scene/mesh_file.h"
 #include "tissue_sim/scene/resource_path.h"
+#include "xml_tags.h"
 
 namespace tissue_sim {
 namespace {
@@ -36,44 +38,11 @@ class ParserMessages : public console_bridge::OutputHandler {
 /// Where the tags of an XML text stop matching: "12: <link> is never closed". Empty if they all match.
 /// urdfdom's own message for this has no line.
 std::string unbalanced_tag(const std::string& text) {
-  struct Open {
-    std::string name;
-    long line;
-  };
-  std::vector<Open> open;
-  const auto line_of = [&](std::size_t at) {
-    return 1 + std::count(text.begin(), text.begin() + static_cast<long>(at), '\n');
-  };
-  const auto say = [](long line, const std::string& what) { return std::to_string(line) + ": " + what; };
-  for (std::size_t at = text.find('<'); at != std::string::npos; at = text.find('<', at)) {
-    std::string end = ">";
-    if (text.compare(at, 4, "<!--") == 0) end = "-->";
-    if (text.compare(at, 2, "<?") == 0) end = "?>";
-    if (text.compare(at, 9, "<![CDATA[") == 0) end = "]]>";
-    std::size_t close = at + 1;
-    char quote = 0;  // a '>' inside an attribute's value ends nothing
-    for (; close < text.size(); ++close) {
-      const char c = text[close];
-      if (end == ">" && c == '<' && !quote) break;
-      if (end == ">" && (c == '"' || c == '\'') && (!quote || quote == c)) quote = quote ? '\0' : c;
-      if (!quote && text.compare(close, end.size(), end) == 0) break;
-    }
-    if (close >= text.size() || text[close] == '<') return say(line_of(at), "a tag is not ended by " + end);
-    const std::size_t name_end = text.find_first_of(" \t\r\n/>", at + 2);
-    if (text[at + 1] == '/') {
-      const std::string name = text.substr(at + 2, text.find_first_of(" \t\r\n>", at + 2) - at - 2);
-      if (open.empty()) return say(line_of(at), "</" + name + "> closes nothing");
-      if (open.back().name != name) {
-        return say(line_of(at), "</" + name + "> where <" + open.back().name + "> of line " +
-                                    std::to_string(open.back().line) + " should be closed");
-      }
-      open.pop_back();
-    } else if (text[at + 1] != '!' && text[at + 1] != '?' && text[close - 1] != '/') {
-      open.push_back({text.substr(at + 1, name_end - at - 1), line_of(at)});
-    }
-    at = close;
+  XmlTags tags(text);
+  XmlTag tag;
+  while (tags.next(tag)) {
   }
-  return open.empty() ? "" : say(open.back().line, "<" + open.back().name + "> is never closed");
+  return tags.fault();
 }
 
 Pose to_pose(const urdf::Pose& pose) {
@@ -81,12 +50,24 @@ Pose to_pose(const urdf::Pose& pose) {
           Eigen::Quaterniond(pose.rotation.w, pose.rotation.x, pose.rotation.y, pose.rotation.z).normalized()};
 }
 
-/// Poses of all links in the root's frame, every joint at zero.
-void place(const urdf::Link& link, const Pose& pose, std::map<std::string, Pose>& poses) {
-  poses[link.name] = pose;
-  for (const auto& child : link.child_links) {
-    place(*child, pose * to_pose(child->parent_joint->parent_to_joint_origin_transform), poses);
+/// Poses of all links in the root's frame, every joint at zero. urdfdom lets several joints lead to one link: round in
+/// a circle, or by ways that double at every link.
+std::map<std::string, Pose> place_links(const std::string& path, const urdf::ModelInterface& model) {
+  std::map<std::string, Pose> poses{{model.getRoot()->name, Pose()}};
+  std::vector<urdf::LinkConstSharedPtr> waiting{model.getRoot()};
+  while (!waiting.empty()) {
+    const urdf::LinkConstSharedPtr link = waiting.back();
+    waiting.pop_back();
+    for (const auto& child : link->child_links) {
+      const Pose pose = poses.at(link->name) * to_pose(child->parent_joint->parent_to_joint_origin_transform);
+      if (!poses.emplace(child->name, pose).second) {
+        throw SceneError(path + ": several joints lead to link '" + child->name +
+                         "', a link is the child of one joint");
+      }
+      waiting.push_back(child);
+    }
   }
+  return poses;
 }
 
 struct Shape {
@@ -151,7 +132,7 @@ urdf::ModelInterfaceSharedPtr parse(const std::string& path) {
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   if (!file && text.empty()) throw SceneError(path + ": cannot be read, check that it is a file you may read");
   const std::string unbalanced = unbalanced_tag(text);
-  if (!unbalanced.empty()) throw SceneError(path + ":" + unbalanced + ", mend the XML");
+  if (!unbalanced.empty()) throw SceneError(path + ":" + one_line(unbalanced) + ", mend the XML");
   ParserMessages messages;
   urdf::ModelInterfaceSharedPtr model;
   try {
@@ -161,7 +142,8 @@ urdf::ModelInterfaceSharedPtr parse(const std::string& path) {
   }
   // urdfdom goes on without what it cannot read: the tip could be missing.
   if (!model || !model->getRoot() || !messages.text.empty()) {
-    throw SceneError(path + ": is not a URDF: " + (messages.text.empty() ? "it has no <robot>" : messages.text));
+    throw SceneError(path +
+                     ": is not a URDF: " + (messages.text.empty() ? "it has no <robot>" : one_line(messages.text)));
   }
   return model;
 }
@@ -171,17 +153,16 @@ urdf::ModelInterfaceSharedPtr parse(const std::string& path) {
 std::vector<InstrumentPart> load_instrument(const std::string& path, const std::string& tip_link,
                                             std::vector<std::string>& warnings) {
   const urdf::ModelInterfaceSharedPtr model = parse(path);
-  std::map<std::string, Pose> poses;
-  place(*model->getRoot(), Pose(), poses);
+  const std::map<std::string, Pose> poses = place_links(path, *model);
   const auto tip = poses.find(tip_link);
   if (tip == poses.end()) {
     std::string names;
-    for (const auto& link : poses) names += (names.empty() ? "" : ", ") + link.first;
+    for (const auto& link : poses) names += (names.empty() ? "" : ", ") + one_line(link.first);
     throw SceneError(path + ": there is no link '" + tip_link + "' to be the tip_link, there are: " + names);
   }
   std::vector<InstrumentPart> parts;
   for (const auto& [name, pose] : poses) {
-    const std::string where = path + ": link '" + name + "': ";
+    const std::string where = path + ": link '" + one_line(name) + "': ";
     bool fell_back = false;
     const std::vector<Shape> shapes = shapes_of(*model->getLink(name), fell_back);
     if (fell_back && !shapes.empty()) warnings.push_back(where + "has no <collision>, its <visual> is used");
@@ -191,9 +172,9 @@ std::vector<InstrumentPart> load_instrument(const std::string& path, const std::
       try {
         piece = tessellate(*shape.geometry, path, where, mended);
       } catch (const SceneError& error) {
-        throw SceneError(shape.geometry->type == urdf::Geometry::MESH ? where + error.what() : error.what());
+        throw SceneError(one_line(shape.geometry->type == urdf::Geometry::MESH ? where + error.what() : error.what()));
       }
-      for (const std::string& warning : mended) warnings.push_back(where + warning);
+      for (const std::string& warning : mended) warnings.push_back(one_line(where + warning));
       if (piece.mesh.triangles.empty()) {
         warnings.push_back(where + "a primitive of zero size is skipped");
         continue;

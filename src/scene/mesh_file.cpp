@@ -8,9 +8,12 @@
 #include <array>
 #include <assimp/Importer.hpp>
 #include <cctype>
+#include <fstream>
+#include <iterator>
 #include <set>
 
-#include "ply_check.h"
+#include "mesh_formats.h"
+#include "one_line.h"
 #include "tissue_sim/scene/scene.h"
 
 namespace tissue_sim {
@@ -23,15 +26,14 @@ constexpr double flat_ratio = 1e-9;
   throw SceneError(path + ": " + problem);
 }
 
-void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent, const Vector3& scale,
-            TriangleMesh& mesh) {
+void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent, TriangleMesh& mesh) {
   const aiMatrix4x4 transform = parent * node.mTransformation;
   for (unsigned m = 0; m < node.mNumMeshes; ++m) {
     const aiMesh& source = *scene.mMeshes[node.mMeshes[m]];
     const int first = static_cast<int>(mesh.vertices.size());
     for (unsigned v = 0; v < source.mNumVertices; ++v) {
       const aiVector3D p = transform * source.mVertices[v];
-      mesh.vertices.push_back(scale.cwiseProduct(Vector3(p.x, p.y, p.z)));
+      mesh.vertices.emplace_back(p.x, p.y, p.z);
     }
     for (unsigned f = 0; f < source.mNumFaces; ++f) {
       const aiFace& face = source.mFaces[f];
@@ -41,7 +43,7 @@ void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent,
       mesh.triangles.push_back(triangle);
     }
   }
-  for (unsigned c = 0; c < node.mNumChildren; ++c) append(scene, *node.mChildren[c], transform, scale, mesh);
+  for (unsigned c = 0; c < node.mNumChildren; ++c) append(scene, *node.mChildren[c], transform, mesh);
 }
 
 std::string count(int n, const std::string& one) {
@@ -50,8 +52,8 @@ std::string count(int n, const std::string& one) {
   return std::to_string(n) + " " + (n == 1 ? one : many);
 }
 
-/// Faces of more than three corners. Refuses faces that assimp has left unset, as it does for a PLY file that ends
-/// among its vertices: cutting those into triangles ends the program in an assertion.
+/// Faces of more than three corners. Refuses faces that assimp has left unset: cutting those into triangles ends the
+/// program in an assertion.
 int count_polygons(const std::string& path, const aiScene& scene) {
   int polygons = 0;
   for (unsigned m = 0; m < scene.mNumMeshes; ++m) {
@@ -99,6 +101,39 @@ double size_of(const TriangleMesh& mesh) {
     high = high.cwiseMax(p);
   }
   return (high - low).norm();
+}
+
+/// The bytes of a file. resolve_path() has seen to it that it has an end.
+std::string read_bytes(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string bytes{std::istreambuf_iterator<char>(file), {}};
+  if (!file) fail(path, "cannot be read, check that it is a file you may read");
+  return bytes;
+}
+
+/// A text that assimp reads into `importer`; its faces may have more than three corners.
+const aiScene& import(const std::string& path, const std::string& text, const char* ending,
+                      Assimp::Importer& importer) {
+  importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
+  const aiScene* scene = importer.ReadFileFromMemory(text.data(), text.size(), 0, ending);
+  if (!scene || !scene->mRootNode) throw std::runtime_error(importer.GetErrorString());
+  const int polygons = count_polygons(path, *scene);
+  if (polygons > 0) scene = importer.ApplyPostProcessing(aiProcess_Triangulate);
+  if (!scene) fail(path, "its " + count(polygons, "polygon") + " cannot be cut into triangles, export triangles");
+  return *scene;
+}
+
+/// The surface in the bytes of a file, in its own units.
+TriangleMesh read_surface(const std::string& path, const std::string& ending, std::string bytes) {
+  if (ending == ".stl") return read_stl(bytes);
+  TriangleMesh mesh;
+  const bool dae = ending == ".dae";
+  const std::string text = dae ? plain_dae(std::move(bytes)) : ending == ".ply" ? plain_ply(bytes) : plain_obj(bytes);
+  if (text.empty()) return mesh;
+  Assimp::Importer importer;
+  const aiScene& scene = import(path, text, dae ? "dae" : "obj", importer);
+  append(scene, *scene.mRootNode, aiMatrix4x4(), mesh);
+  return mesh;
 }
 
 template <typename Unwanted>
@@ -172,22 +207,15 @@ TriangleMesh read_mesh(const std::string& path, const Vector3& scale) {
   if (std::find(known.begin(), known.end(), ending) == known.end()) {
     fail(path, "is not a mesh that can be read, allowed are .stl, .obj, .ply and .dae");
   }
-  const std::string missing = ending == ".ply" ? missing_in_ply(path) : "";
-  if (!missing.empty()) fail(path, "has not " + missing + ", export it again");
-  Assimp::Importer importer;
-  importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
-  const aiScene* scene = importer.ReadFile(path, 0);
-  if (!scene || !scene->mRootNode) {
-    std::string why = importer.GetErrorString();
-    std::replace_if(
-        why.begin(), why.end(), [](unsigned char c) { return c < 32 || c > 126; }, ' ');
-    fail(path, "cannot be read as a mesh (" + why + "), export it again");
-  }
-  const int polygons = count_polygons(path, *scene);
-  if (polygons > 0) scene = importer.ApplyPostProcessing(aiProcess_Triangulate);
-  if (!scene) fail(path, "its " + count(polygons, "polygon") + " cannot be cut into triangles, export triangles");
   TriangleMesh mesh;
-  append(*scene, *scene->mRootNode, aiMatrix4x4(), scale, mesh);
+  try {
+    mesh = read_surface(path, ending, read_bytes(path));
+  } catch (const SceneError&) {
+    throw;
+  } catch (const std::runtime_error& error) {
+    fail(path, "cannot be read as a mesh (" + one_line(error.what()) + "), export it again");
+  }
+  for (Vector3& p : mesh.vertices) p = scale.cwiseProduct(p);
   if (mesh.triangles.empty()) fail(path, "holds no triangles, export the surface, not only its points or lines");
   return mesh;
 }

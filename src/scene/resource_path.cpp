@@ -109,6 +109,8 @@ std::string resolve_path(const std::string& reference, const std::string& naming
   if (!fs::exists(path, error)) {
     throw SceneError("there is no file '" + path.lexically_normal().string() + "', which '" + reference + "' names");
   }
+  // /dev/zero never ends.
+  if (!fs::is_regular_file(path, error)) throw SceneError("'" + path.string() + "' is a device or a pipe, name a file");
   return path.lexically_normal().string();
 }
 

@@ -24,6 +24,9 @@ namespace {
 /// much lets the soft bending of coarse meshes creep instead.
 constexpr double default_drag = 5.0;
 
+/// s. Stamps are whole nanoseconds: a step of less than one never ends, and of a few ends no gap between two poses.
+constexpr double shortest_time_step = 1e-6;
+
 /// Objects of one scene whose sizes differ by more than this do not belong together: a mesh in millimetres that is
 /// read as metres, for one.
 constexpr double size_ratio_limit = 1000.0;
@@ -516,7 +519,8 @@ Scene load_scene(const std::string& path, std::vector<std::string>& warnings) {
   scene.frame = yaml.name("frame");
   scene.gravity = yaml.vector("gravity", Vector3::Zero());
   scene.time_step = yaml.number(
-      "time_step", [](double x) { return x > 0.0 && x <= 0.1; }, "a number above 0 and at most 0.1, in seconds");
+      "time_step", [](double x) { return x >= shortest_time_step && x <= 0.1; },
+      "a number from 1e-6 to 0.1, in seconds");
   scene.max_substeps = yaml.whole_number("max_substeps", 1, 10000, scene.max_substeps);
   scene.accuracy = read_accuracy(yaml);
   const Frames frames = read_frames(yaml, scene.frame);

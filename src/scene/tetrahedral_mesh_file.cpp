@@ -12,6 +12,7 @@
 #include <sstream>
 #include <string_view>
 
+#include "one_line.h"
 #include "tissue_sim/scene/scene.h"
 
 namespace tissue_sim {
@@ -89,7 +90,7 @@ class MshReader {
   std::string_view line() const { return line_; }
 
   [[noreturn]] void fail(const std::string& problem, int line) const {
-    throw SceneError(path_ + ":" + std::to_string(line) + ": " + problem);
+    throw SceneError(path_ + ":" + std::to_string(line) + ": " + one_line(problem));
   }
   [[noreturn]] void fail(const std::string& problem) const { fail(problem, std::max(line_number_, 1)); }
 

@@ -1,5 +1,7 @@
 #include "yaml_mapping.h"
 
+#include <yaml-cpp/eventhandler.h>
+
 #include <algorithm>
 #include <cmath>
 #include <fstream>
@@ -7,18 +9,13 @@
 #include <numeric>
 #include <sstream>
 
+#include "one_line.h"
+
 namespace tissue_sim {
 namespace {
 
 std::string at(const std::string& file, const YAML::Mark& mark) {
   return file + ":" + std::to_string(mark.line + 1) + ":" + std::to_string(mark.column + 1) + ": ";
-}
-
-/// Values and messages from elsewhere may hold line breaks; an error is one line.
-std::string one_line(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](unsigned char c) { return c < 32 || c == 127; }, ' ');
-  return text;
 }
 
 /// What stands in the file, fit for one line of an error.
@@ -74,17 +71,56 @@ std::string join(YamlMapping::Keys words) {
   return list;
 }
 
+/// yaml-cpp takes one of them for the end of the file wherever it stands: what follows would be lost.
+void refuse_control_characters(const std::string& file, const std::string& text) {
+  int line = 1, column = 1;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if ((byte < 32 && c != '\t' && c != '\n' && c != '\r') || byte == 127) {
+      throw SceneError(file + ":" + std::to_string(line) + ":" + std::to_string(column) + ": scene: holds byte " +
+                       std::to_string(byte) + ", which is no text: save it as UTF-8");
+    }
+    line += c == '\n';
+    column = c == '\n' ? 1 : column + 1;
+  }
+}
+
+/// Hears a document, and lets all pass that is in it.
+struct Deaf : YAML::EventHandler {
+  void OnDocumentStart(const YAML::Mark&) override {}
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t, const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
+  void OnMapEnd() override {}
+};
+
+/// 0, 1 or 2, for two or more. YAML::LoadAll never ends on a text that begins with a comma: it finds document after
+/// document there, all empty.
+int count_documents(const std::string& text) {
+  std::istringstream stream(text);
+  YAML::Parser parser(stream);
+  Deaf handler;
+  int documents = 0;
+  while (documents < 2 && parser.HandleNextDocument(handler)) ++documents;
+  return documents;
+}
+
 YAML::Node load(const std::string& file) {
   std::ifstream stream(file);
   std::stringstream text;
   if (!stream || !(text << stream.rdbuf())) {
     throw SceneError(at(file, YAML::Mark()) + "scene: is empty or cannot be read, name a scene file (YAML)");
   }
+  refuse_control_characters(file, text.str());
   try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(text.str());
-    if (documents.size() == 1) return documents[0];
-    throw SceneError(at(file, YAML::Mark()) + "scene: holds " + std::to_string(documents.size()) +
-                     " YAML documents, a scene is one");
+    const int documents = count_documents(text.str());
+    if (documents == 1) return YAML::Load(text.str());
+    throw SceneError(at(file, YAML::Mark()) + "scene: holds " + (documents == 0 ? "no" : "more than one") +
+                     " YAML document, a scene is one");
   } catch (const YAML::Exception& error) {
     throw SceneError(at(file, error.mark.is_null() ? YAML::Mark() : error.mark) +
                      "scene: is not YAML: " + one_line(error.msg));

@@ -235,7 +235,8 @@ void prepare(ElementRoom& room, const RestShape& rest) {
 int substeps_for(const RestShape& rest, double duration, double stiffening) {
   if (!rest.elastic()) return 1;
   const double shorter = std::sqrt(std::clamp(stiffening, solid_stiffening, most_stiffening) / solid_stiffening);
-  return std::max(1, static_cast<int>(std::ceil(shorter * duration / rest.stable_substep - 1e-9)));
+  const double substeps = std::ceil(shorter * duration / rest.stable_substep - 1e-9);
+  return substeps < 1e9 ? std::max(1, static_cast<int>(substeps)) : 1'000'000'000;  // NaN too: no scene allows as many
 }
 
 double stiffening(const RestShape& rest, const FlatLists& tetrahedra_at, const std::vector<ContactPoint>& points,

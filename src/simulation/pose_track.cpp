@@ -5,7 +5,8 @@
 namespace tissue_sim {
 
 namespace {
-constexpr double farthest = 1000.0;  ///< m from the scene's origin
+constexpr double farthest = 1000.0;                                                      ///< m from the scene's origin
+constexpr std::int64_t latest = (4'294'967'295 - 86'400) * std::int64_t{1'000'000'000};  ///< ns: 2^32 s but for a day
 constexpr double shortest_quaternion = 1e-6;
 constexpr double off_unit_length = 1e-3;  ///< of a quaternion: rounding and drift stay well below
 }  // namespace
@@ -24,15 +25,20 @@ const char* to_string(PoseVerdict verdict) {
       return "stale";
     case PoseVerdict::new_run:
       return "new run";
+    case PoseVerdict::late_stamp:
+      return "late stamp";
+    case PoseVerdict::too_far:
+      return "too far";
   }
   return "";
 }
 
 PoseVerdict judge_pose(StampedPose& pose, bool& normalised) {
   if (pose.stamp <= 0) return PoseVerdict::zero_stamp;
+  if (pose.stamp > latest) return PoseVerdict::late_stamp;
   Eigen::Vector4d& q = pose.pose.orientation.coeffs();
   if (!pose.pose.position.allFinite() || !q.allFinite()) return PoseVerdict::non_finite;
-  if (!(pose.pose.position.cwiseAbs().maxCoeff() <= farthest)) return PoseVerdict::non_finite;
+  if (pose.pose.position.cwiseAbs().maxCoeff() > farthest) return PoseVerdict::too_far;
   const double largest = q.cwiseAbs().maxCoeff();
   if (!(largest > shortest_quaternion)) return PoseVerdict::zero_quaternion;
   normalised = std::abs(q.stableNorm() - 1.0) > off_unit_length;

@@ -1,6 +1,10 @@
 #include "tissue_sim/ros/frames.h"
 
 #include <gtest/gtest.h>
+#include <ros/serialization.h>
+
+#include <cmath>
+#include <vector>
 
 namespace tissue_sim {
 namespace {
@@ -83,6 +87,42 @@ TEST(Frames, AZeroStampIsLeftToTheTimeline) {
   std::string why;
   EXPECT_TRUE(into_scene_frame(empty, "world", pose_at(0, "nowhere"), pose, why));
   EXPECT_EQ(pose.in_scene.stamp, 0);
+}
+
+TEST(Transforms, OfTheLastSecondsOfRosTimeAreRefusedNotThrown) {
+  tf2::BufferCore transforms;  // keeps 10 s
+  geometry_msgs::TransformStamped arm;
+  arm.header.frame_id = "world";
+  arm.child_frame_id = "arm";
+  arm.transform.rotation.w = 1.0;
+  for (const std::uint32_t second : {4294967295U, 4294967290U, 4294967285U}) {
+    arm.header.stamp = ros::Time(second, 999999999);
+    EXPECT_FALSE(give_transform(arm, "test", false, transforms)) << second;
+  }
+  arm.header.stamp = ros::Time(4294967280U, 0);
+  EXPECT_TRUE(give_transform(arm, "test", false, transforms));
+  arm.transform.rotation.w = std::nan("");
+  EXPECT_FALSE(give_transform(arm, "test", false, transforms)) << "tf2 takes no NaN";
+}
+
+TEST(Transforms, AreCountedBeforeThereIsRoomForThem) {
+  tf2_msgs::TFMessage message;
+  message.transforms.resize(2);
+  message.transforms[1].child_frame_id = "arm";
+  std::vector<std::uint8_t> bytes(ros::serialization::serializationLength(message));
+  ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+  ros::serialization::serialize(stream, message);
+
+  tf2_msgs::TFMessage read;
+  ASSERT_TRUE(deserialize_transforms(bytes, read));
+  EXPECT_EQ(read.transforms.size(), 2U);
+  EXPECT_EQ(read.transforms[1].child_frame_id, "arm");
+  for (std::size_t length = 0; length < bytes.size(); ++length) {
+    std::vector<std::uint8_t> cut(bytes.begin(), bytes.begin() + static_cast<long>(length));
+    EXPECT_FALSE(deserialize_transforms(cut, read)) << length;
+  }
+  bytes[3] = 0xff;  // four billion of them
+  EXPECT_FALSE(deserialize_transforms(bytes, read));
 }
 
 TEST(FrameHistory, GivesTheLastPoseAtOrBefore) {

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Poses in another frame than the scene's: tf2 takes them there, and the force goes back."""
 import math
+import struct
 import unittest
 
 import rospy
@@ -73,6 +74,27 @@ class FramesTest(unittest.TestCase):
         # It goes on with the next pose that can be used.
         node.poses.publish(pose_message(START + 10 * 5 * MS, (0, 0, TOUCH - 0.001)))
         self.assertTrue(wait_until(lambda: stamp_of(contacts[-1]) == START + 10 * 5 * MS))
+
+    def test_hostile_transforms_do_not_end_the_node(self):
+        class Liar(TFMessage):
+            """Announces a hundred million transforms, ten gigabytes, in a hundred bytes."""
+            def serialize(self, buff):
+                buff.write(struct.pack('<I', 10**8) + bytes(96))
+
+        node = self.start('hostile_frames', tf_timeout=0.2)
+        contacts = node.listen('contacts', Contacts)
+        moving = rospy.Publisher('/tf', TFMessage, queue_size=10)
+        self.assertTrue(wait_until(lambda: moving.get_num_connections() > 0))
+        turn = (0, 0, 0, 1)
+        moving.publish(TFMessage([transform('late', (0, 0, 0), turn, (2**32 - 1) * 10**9)]))
+        moving.publish(TFMessage([transform('nan', (float('nan'), 0, 0), turn), transform('world', (0, 0, 0), turn),
+                                  transform('zero', (0, 0, 0), (0, 0, 0, 0))]))
+        moving.publish(Liar())
+        moving.publish(TFMessage([transform('cart', (0, 0, TOUCH - 0.002), turn),
+                                  transform('cart', (0, 0, TOUCH - 0.002), turn, START + 10**9)]))
+        for i in range(5):
+            node.poses.publish(pose_message(START + i * 5 * MS, (0, 0, 0), frame='cart'))
+        self.assertTrue(wait_until(lambda: contacts and stamp_of(contacts[-1]) == START + 4 * 5 * MS), node.diagnostics)
 
     def test_a_pose_waits_for_its_transform(self):
         node = self.start('late_frame', tf_timeout=5.0)

@@ -120,6 +120,28 @@ TEST(OrganMesh, ColladaWithAnotherUpAxisIsNotTurned) {
   for (std::size_t v = 0; v < y_up.vertices.size(); ++v) EXPECT_EQ(y_up.vertices[v], as_it_is.vertices[v]);
 }
 
+/// As modelling programs write it: with libraries of other things, empty ones, and what is bound to the mesh.
+TEST(OrganMesh, ColladaWithMoreThanAShapeLoads) {
+  const TemporaryFolder folder;
+  std::string text = collada;
+  const auto insert = [&](const char* before, const char* what) { text.insert(text.find(before), what); };
+  insert(
+      "<library_geometries>",
+      "<library_cameras/><library_images/><library_effects><effect id='e'><profile_COMMON><technique sid='t'><lambert>"
+      "<diffuse><color>1 1 1 1</color></diffuse></lambert></technique></profile_COMMON></effect></library_effects>"
+      "<library_materials><material id='m'><instance_effect url='#e'/></material></library_materials>");
+  insert("<library_visual_scenes>",
+         "<library_controllers/><library_nodes><node id='n'><instance_geometry url='#g'><bind_material>"
+         "<technique_common><instance_material symbol='m' target='#m'/></technique_common></bind_material>"
+         "</instance_geometry><extra><technique profile='x'><a b='>'>0</a></technique></extra></node></library_nodes>");
+  insert("</visual_scene>",
+         "<node><matrix sid='t'>1 0 0 9 0 1 0 0 0 0 1 0 0 0 0 1</matrix><instance_node url='#n'/></node>");
+  std::vector<std::string> warnings;
+  const TriangleMesh mesh = load_organ_mesh(folder.write("t.dae", text), 1.0, warnings);
+  EXPECT_EQ(mesh.triangles.size(), 8u) << "the tetrahedron twice, once as a node of the library";
+  EXPECT_NEAR(enclosed_volume(mesh), 2e-6 / 6.0, 1e-12);
+}
+
 TEST(OrganMesh, PolygonsAreCut) {
   const TemporaryFolder folder;
   std::vector<std::string> warnings;

@@ -159,9 +159,16 @@ TEST(Timeline, PosesOfNoUseAreNamedAndCounted) {
 
   EXPECT_EQ(timeline.add_pose(0, at(0)), PoseVerdict::zero_stamp);
   EXPECT_EQ(timeline.add_pose(0, at(-5)), PoseVerdict::zero_stamp);
-  for (const double bad : {not_a_number, infinity, -infinity, 1e300, 1001.0}) {
+  for (const double bad : {not_a_number, infinity, -infinity}) {
     EXPECT_EQ(timeline.add_pose(0, at(start + ms, {0.0, bad, 0.0})), PoseVerdict::non_finite) << bad;
   }
+  for (const double far : {1e300, -1001.0}) {
+    EXPECT_EQ(timeline.add_pose(0, at(start + ms, {0.0, far, 0.0})), PoseVerdict::too_far) << far;
+  }
+  // A day before the end of a ros::Time and later.
+  const std::int64_t end = (std::int64_t{1} << 32) * 1'000'000'000;
+  EXPECT_EQ(timeline.add_pose(0, at(end - 1)), PoseVerdict::late_stamp);
+  EXPECT_EQ(timeline.add_pose(0, at(end - 86'400 * 1'000'000'000LL)), PoseVerdict::late_stamp);
   StampedPose pose = at(start + ms);
   pose.pose.orientation.coeffs() << 0.0, 0.0, not_a_number, 1.0;
   EXPECT_EQ(timeline.add_pose(0, pose), PoseVerdict::non_finite);
@@ -175,7 +182,9 @@ TEST(Timeline, PosesOfNoUseAreNamedAndCounted) {
 
   EXPECT_EQ(count(timeline, PoseVerdict::used), 1u);
   EXPECT_EQ(count(timeline, PoseVerdict::zero_stamp), 2u);
-  EXPECT_EQ(count(timeline, PoseVerdict::non_finite), 7u);
+  EXPECT_EQ(count(timeline, PoseVerdict::late_stamp), 2u);
+  EXPECT_EQ(count(timeline, PoseVerdict::non_finite), 5u);
+  EXPECT_EQ(count(timeline, PoseVerdict::too_far), 2u);
   EXPECT_EQ(count(timeline, PoseVerdict::zero_quaternion), 1u);
   EXPECT_EQ(count(timeline, PoseVerdict::stale), 3u);
   EXPECT_FALSE(timeline.step());
@@ -221,8 +230,9 @@ TEST(Timeline, PosesFartherApartThanTheLongestGapStartANewRun) {
   run(timeline);
   EXPECT_EQ(timeline.add_pose(0, at(start + 10'001 * ms)), PoseVerdict::new_run);
   EXPECT_EQ(run(timeline).size(), 1u);
-  EXPECT_EQ(timeline.add_pose(0, at(std::numeric_limits<std::int64_t>::max())), PoseVerdict::new_run);
-  EXPECT_EQ(run(timeline), std::vector<std::int64_t>{std::numeric_limits<std::int64_t>::max()});
+  const std::int64_t late = ((std::int64_t{1} << 32) - 100'000) * 1'000'000'000;  // a day and more before stamps end
+  EXPECT_EQ(timeline.add_pose(0, at(late)), PoseVerdict::new_run);
+  EXPECT_EQ(run(timeline), std::vector<std::int64_t>{late});
   EXPECT_EQ(timeline.add_pose(0, at(start)), PoseVerdict::new_run);
   EXPECT_EQ(run(timeline), std::vector<std::int64_t>{start});
 }

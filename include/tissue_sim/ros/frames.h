@@ -1,11 +1,14 @@
 #pragma once
 
 #include <geometry_msgs/PoseStamped.h>
+#include <geometry_msgs/TransformStamped.h>
 #include <tf2/buffer_core.h>
+#include <tf2_msgs/TFMessage.h>
 
 #include <cstdint>
 #include <deque>
 #include <string>
+#include <vector>
 
 #include "tissue_sim/simulation/timeline.h"
 
@@ -22,6 +25,16 @@ struct FramedPose {
 /// no such transform (yet). Without a change of frame no transform is looked up at all.
 bool into_scene_frame(const tf2::BufferCore& transforms, const std::string& scene_frame,
                       const geometry_msgs::PoseStamped& message, FramedPose& pose, std::string& why);
+
+/// Transforms as they stand in a recording. False where the bytes end too early, or where they announce more transforms
+/// than they can hold: roscpp makes room for all that are announced before it reads the first. The bytes stay as they
+/// are.
+bool deserialize_transforms(std::vector<std::uint8_t>& bytes, tf2_msgs::TFMessage& message);
+
+/// Gives a transform to tf2. False where it is refused: by tf2, or because its stamp is so late that the time for which
+/// tf2 keeps it has no ROS stamp any more; tf2 itself ends in an exception there that nobody takes.
+bool give_transform(const geometry_msgs::TransformStamped& transform, const std::string& authority, bool is_static,
+                    tf2::BufferCore& transforms);
 
 /// The frames that one instrument's poses came in, until the steps have caught up with them.
 class FrameHistory {

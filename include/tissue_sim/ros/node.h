@@ -3,7 +3,6 @@
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
 #include <tf2_ros/buffer.h>
-#include <tf2_ros/transform_listener.h>
 
 #include <cstdint>
 #include <deque>
@@ -12,6 +11,7 @@
 
 #include "tissue_sim/ros/frames.h"
 #include "tissue_sim/ros/messages.h"
+#include "tissue_sim/ros/transform_feed.h"
 #include "tissue_sim/simulation/accuracy.h"
 #include "tissue_sim/simulation/timeline.h"
 
@@ -88,7 +88,7 @@ class Node {
   ros::NodeHandle node_, private_{"~"}, serving_{"~"};
   ros::CallbackQueue poses_, services_;
   tf2_ros::Buffer transforms_;
-  tf2_ros::TransformListener transform_listener_{transforms_};
+  TransformFeed transform_feed_{transforms_};
   std::vector<Input> inputs_;
   std::vector<Output> outputs_;
   ros::Publisher contacts_, markers_, diagnostics_;

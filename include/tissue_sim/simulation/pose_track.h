@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <deque>
 
@@ -13,11 +14,17 @@ struct StampedPose {
   Pose pose;
 };
 
-/// non_finite: not a number, or farther than 1 km from the scene's origin. stale: not later than the pose before it,
-/// but by no more than time_jump_threshold. new_run: taken as the first pose of a new run, since the stamps jumped.
-enum class PoseVerdict { used, zero_stamp, non_finite, zero_quaternion, stale, new_run };
-constexpr int pose_verdicts = 6;
+/// late_stamp: within a day of the end of a ROS stamp (the year 2106), or behind it: time could not go on from there.
+/// too_far: farther than 1 km from the scene's origin. stale: not later than the pose before it, but by no more than
+/// time_jump_threshold. new_run: taken as the first pose of a new run, since the stamps jumped.
+enum class PoseVerdict { used, zero_stamp, non_finite, zero_quaternion, stale, new_run, late_stamp, too_far };
+constexpr int pose_verdicts = 8;
 const char* to_string(PoseVerdict verdict);
+
+/// The causes to drop a pose for.
+constexpr std::array<PoseVerdict, 6> dropped_verdicts{PoseVerdict::zero_stamp,      PoseVerdict::late_stamp,
+                                                      PoseVerdict::non_finite,      PoseVerdict::too_far,
+                                                      PoseVerdict::zero_quaternion, PoseVerdict::stale};
 
 /// The poses of one instrument: where it is, and where it will be.
 struct PoseTrack {
