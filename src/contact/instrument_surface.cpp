@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "tissue_sim/geometry/elementary.h"
+
 namespace tissue_sim {
 
 namespace {
@@ -14,7 +16,7 @@ constexpr double on_surface = 1e-9;
 constexpr double corner_angle = 0.5;
 
 double angle_between(const Vector3& unit_a, const Vector3& unit_b) {
-  return std::acos(std::clamp(unit_a.dot(unit_b), -1.0, 1.0));
+  return arc_cosine(std::clamp(unit_a.dot(unit_b), -1.0, 1.0));
 }
 
 /// Along an edge of length e the normal of a curve of radius r turns by e / r.
@@ -32,6 +34,12 @@ double radius_at(const InstrumentSurface& surface, int vertex) {
     smallest = std::min(smallest, (surface.vertices[a] - surface.vertices[b]).norm() / std::max(angle, 1e-9));
   }
   return smallest;
+}
+
+/// Unit. At a vertex the one that is known already: its angles cost more than all else here.
+Vector3 normal_at(const InstrumentSurface& surface, int triangle, Feature feature) {
+  if (feature < Feature::rim_0) return surface.vertex_normals[surface.triangles[triangle][static_cast<int>(feature)]];
+  return pseudonormal(surface.vertices, surface.triangles, surface.topology, triangle, feature).stableNormalized();
 }
 
 }  // namespace
@@ -83,9 +91,7 @@ Box scene_bounds(const Box& box, const Pose& pose) {
 ClosestFeature closest_feature(const InstrumentSurface& surface, const Vector3& p, double reach, int guess) {
   const ClosestOnMesh closest = closest_on_mesh(surface.vertices, surface.triangles, surface.tree, p, reach, guess);
   if (closest.triangle < 0) return {p, Vector3::UnitZ(), -std::numeric_limits<double>::max(), -1};
-  const Vector3 normal =
-      pseudonormal(surface.vertices, surface.triangles, surface.topology, closest.triangle, closest.on.feature)
-          .stableNormalized();
+  const Vector3 normal = normal_at(surface, closest.triangle, closest.on.feature);
   const Vector3 way_out = closest.on.point - p;
   const double distance = std::sqrt(closest.squared_distance);
   const bool inside = way_out.dot(normal) > 0.0;

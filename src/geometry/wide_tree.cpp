@@ -511,15 +511,11 @@ struct Builder {
 }  // namespace
 
 bool available(Registers registers) {
-#ifdef __x86_64__
-  if (registers == Registers::wide) return __builtin_cpu_supports("avx2") != 0;
-#endif
-  return registers == Registers::narrow;
+  return registers == Registers::narrow || available(InstructionSet::avx2);
 }
 
 Registers widest_registers() {
-  static const Registers widest = available(Registers::wide) ? Registers::wide : Registers::narrow;
-  return widest;
+  return instruction_set() == InstructionSet::baseline ? Registers::narrow : Registers::wide;
 }
 
 WideTree build_wide_tree(const std::vector<Vector3>& vertices, const std::vector<Triangle>& triangles) {

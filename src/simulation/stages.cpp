@@ -33,10 +33,6 @@ class Lap {
   std::chrono::steady_clock::time_point start_;
 };
 
-double angle_between(const Pose& a, const Pose& b) {
-  return a.orientation.angularDistance(b.orientation);
-}
-
 Vector3 velocity_of(const Pose& before, const Pose& now, const Vector3& point, double dt) {
   return (point - before.apply(now.apply_inverse(point))) / dt;
 }
