@@ -95,7 +95,9 @@ TEST_F(Elementary, HaveTheBitsTheyAlwaysHad) {
     add(natural_logarithm(1.0 + square(x)));
     const Eigen::Quaterniond from(0.8, 0.6, 0.0, 0.0);
     const Eigen::Quaterniond to = turn(x, Eigen::Vector3d(0.36, 0.48, 0.8));
-    for (const double part : interpolate({{}, from}, {{}, to}, 0.3).orientation.coeffs()) add(part);
+    const Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+    const Pose between = interpolate({origin, from}, {origin, to}, 0.3);
+    for (Eigen::Index c = 0; c < 4; ++c) add(between.orientation.coeffs()[c]);
   }
   EXPECT_EQ(hash, 0u);
 }
@@ -112,7 +114,8 @@ TEST_F(Elementary, InterpolateIsAnEvenTurn) {
         const Pose between = interpolate(from, to, part);
         EXPECT_NEAR(angle_between(from, between), part * angle, 1e-12);
         EXPECT_NEAR(between.orientation.norm(), 1.0, 1e-15);
-        EXPECT_NEAR(angle_between(between, {{}, from.orientation * turn(part * angle, axis)}), 0.0, 1e-12);
+        EXPECT_NEAR(angle_between(between, {Eigen::Vector3d::Zero(), from.orientation * turn(part * angle, axis)}), 0.0,
+                    1e-12);
       }
     }
   }
