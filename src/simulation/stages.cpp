@@ -184,6 +184,22 @@ bool all_awake(const std::vector<ContactPoint>& points, const OrganState& state)
   return true;
 }
 
+/// Their lists grow to this sooner or later; from the start, since the first time may come after hours.
+void make_room(Detection& detection, Penetration& penetration) {
+  detection.crossings.reserve(usual_contacts);
+  detection.crossed_edges.reserve(usual_contacts);
+  detection.unordered.reserve(usual_contacts);
+  detection.pairs.reserve(usual_contacts);
+  for (std::vector<int>* list :
+       {&detection.border, &detection.border_outside, &detection.colliding, &detection.stack,
+        &detection.tree_room.stack, &detection.tree_room.leaves, &penetration.layer, &penetration.next_layer}) {
+    list->reserve(usual_contacts);
+  }
+  detection.tree_room.near.reserve(usual_contacts);
+  detection.tree_room.edges.resize(usual_contacts);
+  detection.tree_room.visits.resize(usual_contacts);
+}
+
 }  // namespace
 
 Workspace build_workspace(const World& world, int threads) {
@@ -203,6 +219,7 @@ Workspace build_workspace(const World& world, int threads) {
     for (std::size_t p = 0; p < world.pieces.size(); ++p) {
       prepare(work.detections[p], surface);
       prepare(work.penetrations[p], surface);
+      make_room(work.detections[p], work.penetrations[p]);
     }
     work.accelerations.assign(rest.positions.size(), Vector3::Zero());
     if (rest.elastic()) work.pressing_of.assign(count_memories(world, rest), -1);

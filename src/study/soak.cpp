@@ -22,7 +22,7 @@ constexpr double tip = 0.005;    // m
 constexpr double depth = 0.003;  // m, of the press
 constexpr double above = 0.004;  // m, over the surface, between two presses
 constexpr double pi = 3.14159265358979323846;
-constexpr double golden_angle = 2.39996322972865332;  // rad; places that go around by it never repeat
+constexpr double golden_ratio = 0.61803398874989485;  // places that go on by it never repeat
 constexpr double most_growth = 1e6;                   // bytes
 constexpr double most_slowing = 1.1;
 constexpr std::int64_t step_nanoseconds = 1'000'000;
@@ -47,6 +47,21 @@ double percentile(std::vector<double>& values, double fraction) {
   const auto at = static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), values.begin() + at, values.end());
   return values[static_cast<std::size_t>(at)];
+}
+
+/// From 0 to 1 where x does, without a jerk; 0 before and 1 after.
+double smooth(double x) {
+  const double part = std::clamp(x, 0.0, 1.0);
+  return part * part * (3.0 - 2.0 * part);
+}
+
+/// Unit, from the middle of the organ: where the probe of a cycle is when it has slid so far, 0 to 1. In the upper
+/// half.
+Vector3 place(std::int64_t cycle, double slid) {
+  const auto number = static_cast<double>(cycle);
+  const double polar = 0.2 + 0.9 * std::fmod(golden_ratio * number, 1.0) + 0.15 * slid;
+  const double around = 2.0 * pi * std::fmod(golden_ratio * number, 1.0) * 5.0 + 0.5 * slid;
+  return {std::sin(polar) * std::cos(around), std::sin(polar) * std::sin(around), std::cos(polar)};
 }
 
 /// Times of the steps of a tenth. Its room is there, and in memory, before the first of them.
@@ -86,17 +101,15 @@ Scene soak_scene() {
 }
 
 Pose soak_pose(std::int64_t step) {
-  const auto cycle = static_cast<double>(step / soak_cycle);
+  const std::int64_t cycle = step / soak_cycle;
   const double t = static_cast<double>(step % soak_cycle) / soak_cycle;  // 0 to 1
-  // Down in the first quarter, at the bottom to the middle, up to the third, then away.
-  const double down = std::clamp(std::min(4.0 * t, 3.0 - 4.0 * t), 0.0, 1.0);
-  const double height = radius + tip + above - (above + depth) * down * down * (3.0 - 2.0 * down);
-  const double slid = 0.5 * std::clamp(4.0 * t - 1.0, 0.0, 1.0);  // rad, around the organ
-  const double polar = 0.2 + 0.9 * std::fmod(0.381966 * cycle, 1.0) + 0.3 * slid;
-  const double around = golden_angle * cycle + slid;
+  // Down in the first quarter, at the bottom to the middle, up to the third, then over to the next place.
+  const double down = smooth(std::min(4.0 * t, 3.0 - 4.0 * t));
+  const double height = radius + tip + above - (above + depth) * down;
+  const double over = smooth(4.0 * t - 3.0);
+  const Vector3 here = place(cycle, smooth(4.0 * t - 1.0));
   Pose pose;
-  pose.position =
-      height * Vector3(std::sin(polar) * std::cos(around), std::sin(polar) * std::sin(around), std::cos(polar));
+  pose.position = height * (here + over * (place(cycle + 1, 0.0) - here)).normalized();
   pose.orientation = turn(pi * t, Vector3(0.36, 0.48, 0.8));
   return pose;
 }
