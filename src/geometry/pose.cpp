@@ -33,6 +33,8 @@ Eigen::Quaterniond turn(double angle, const Eigen::Vector3d& axis) {
 }
 
 double angle_between(const Pose& a, const Pose& b) {
+  // Most instruments do not turn in most substeps, and the angle costs as much as a step far from any organ.
+  if (a.orientation.coeffs() == b.orientation.coeffs()) return 0.0;
   const Eigen::Quaterniond turned = a.orientation * b.orientation.conjugate();
   return 2.0 * angle_of(turned.vec().norm(), std::abs(turned.w()));
 }

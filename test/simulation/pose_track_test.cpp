@@ -15,11 +15,11 @@ TEST(PoseQueue, IsADeque) {
   std::size_t longest = 0;
   for (std::int64_t i = 0; i < 100000; ++i) {
     // Grows for a while, then shrinks to nothing.
-    const unsigned chance = random() % 10;
+    const auto chance = random() % 10;
     if (chance == 0 && random() % 1000 == 0) {
       queue.clear();
       plain.clear();
-    } else if (plain.empty() || chance < (i / 1000 % 2 == 0 ? 7u : 3u)) {
+    } else if (plain.empty() || chance < (i / 1000 % 2 == 0 ? 7U : 3U)) {
       StampedPose pose;
       pose.stamp = i;
       queue.push_back(pose);
@@ -30,7 +30,9 @@ TEST(PoseQueue, IsADeque) {
     }
     ASSERT_EQ(queue.empty(), plain.empty());
     ASSERT_EQ(queue.size(), plain.size());
-    if (!plain.empty()) ASSERT_EQ(queue.front().stamp, plain.front());
+    if (!plain.empty()) {
+      ASSERT_EQ(queue.front().stamp, plain.front());
+    }
     longest = std::max(longest, plain.size());
   }
   EXPECT_GT(longest, 100u);
