@@ -153,7 +153,8 @@ void add_vertex_contacts(const OrganSurface& organ, const InstrumentSurface& ins
 void add_edge_contacts(const OrganSurface& organ, const InstrumentSurface& instrument, int piece, const Pose& pose,
                        const Detection& detection, std::vector<ContactPoint>& points) {
   for (const CrossedEdge& crossed : detection.crossed_edges) {
-    const int first = organ.topology.edges[crossed.edge][0], last = organ.topology.edges[crossed.edge][1];
+    const int first = organ.topology.edges[crossed.edge][0];  // a lambda takes no structured binding in C++17
+    const int last = organ.topology.edges[crossed.edge][1];
     const auto add_inside = [&](double t, const Vector3& place) {
       const ClosestFeature closest = closest_feature(instrument, place);
       if (!(closest.depth > 0.0)) return;

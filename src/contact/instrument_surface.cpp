@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "tissue_sim/geometry/elementary.h"
+
 namespace tissue_sim {
 
 namespace {
@@ -14,7 +16,7 @@ constexpr double on_surface = 1e-9;
 constexpr double corner_angle = 0.5;
 
 double angle_between(const Vector3& unit_a, const Vector3& unit_b) {
-  return std::acos(std::clamp(unit_a.dot(unit_b), -1.0, 1.0));
+  return arc_cosine(std::clamp(unit_a.dot(unit_b), -1.0, 1.0));
 }
 
 /// Along an edge of length e the normal of a curve of radius r turns by e / r.

@@ -2,7 +2,8 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
+
+#include "tissue_sim/geometry/elementary.h"
 
 namespace tissue_sim {
 
@@ -26,7 +27,7 @@ ClosestOnTriangle closest_on_rim(const Vector3& p, const std::array<const Vector
 }
 
 double angle_between(const Vector3& u, const Vector3& v) {
-  return std::atan2(u.cross(v).norm(), u.dot(v));
+  return angle_of(u.cross(v).norm(), u.dot(v));
 }
 
 }  // namespace

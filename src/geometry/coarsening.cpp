@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "tissue_sim/geometry/closest_point.h"
+#include "tissue_sim/geometry/elementary.h"
 
 namespace tissue_sim {
 
@@ -178,7 +179,7 @@ class Collapse {
       const Vector3 after = area_normal(place, q, r);
       if (!(after.dot(before) >= least_turned * after.norm() * before.norm())) return false;
       if (thin(after, place, q, r) && !thin(before, x(v), q, r)) return false;
-      if ((q - place).squaredNorm() > std::pow(longest_edge * edge_, 2)) return false;
+      if ((q - place).squaredNorm() > square(longest_edge * edge_)) return false;
     }
     return true;
   }

@@ -1,6 +1,6 @@
 #include "tissue_sim/geometry/primitives.h"
 
-#include <cmath>
+#include "tissue_sim/geometry/elementary.h"
 
 namespace tissue_sim {
 
@@ -9,7 +9,7 @@ constexpr double pi = 3.14159265358979323846;
 
 Vector3 on_circle(int i, int n, double radius, double z) {
   const double angle = 2.0 * pi * i / n;
-  return {radius * std::cos(angle), radius * std::sin(angle), z};
+  return {radius * cosine(angle), radius * sine(angle), z};
 }
 }  // namespace
 
@@ -21,7 +21,7 @@ TriangleMesh make_sphere(double radius, int n) {
   for (int stack = 1; stack < n; ++stack) {
     const double polar = pi * stack / n;
     for (int i = 0; i < n; ++i)
-      mesh.vertices.push_back(on_circle(i, n, radius * std::sin(polar), radius * std::cos(polar)));
+      mesh.vertices.push_back(on_circle(i, n, radius * sine(polar), radius * cosine(polar)));
   }
   mesh.vertices.emplace_back(0.0, 0.0, -radius);
 

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <iostream>
 
+#include "tissue_sim/geometry/instruction_set.h"
 #include "tissue_sim/replay/replay.h"
 #include "tissue_sim/ros/messages.h"
 #include "tissue_sim/simulation/accuracy.h"
@@ -11,6 +12,7 @@
 
 namespace {
 
+using tissue_sim::InstructionSet;
 using tissue_sim::ModelChoice;
 using tissue_sim::PoseVerdict;
 using tissue_sim::ReplayOrgan;
@@ -18,12 +20,15 @@ using tissue_sim::ReplaySummary;
 
 constexpr const char* usage =
     "usage: tissue_sim_replay SCENE IN.bag OUT.bag [--json FILE] [--state-period S] [--hold S] [--threads N]\n"
+    "                         [--hashes FILE] [--instructions baseline|avx2|avx512]\n"
     "  SCENE             scene file; its pose topics are read from IN.bag\n"
     "  OUT.bag           gets topology, state, contacts and measured_cf under /tissue_sim\n"
     "  --json FILE       write the summary, with a row for each pose\n"
     "  --state-period S  simulated seconds between two states (0.016)\n"
     "  --hold S          step on for S seconds after the last pose (0)\n"
-    "  --threads N       for the elements of large organs; the result is the same bits for any number (1)\n";
+    "  --threads N       for the elements of large organs; the result is the same bits for any number (1)\n"
+    "  --hashes FILE     write a line a step: its number, its stamp in ns, a hash of all states up to it\n"
+    "  --instructions S  compute in these registers, not in the widest there are; the result is the same bits\n";
 
 struct Arguments {
   std::string scene, json;
@@ -43,6 +48,16 @@ bool read_threads(const std::string& text, int& threads) {
   return threads >= 1 && threads <= tissue_sim::most_threads;
 }
 
+/// Taken at once: it holds for the whole program.
+bool read_instructions(const std::string& text) {
+  for (const auto set : {InstructionSet::baseline, InstructionSet::avx2, InstructionSet::avx512}) {
+    if (text != name(set)) continue;
+    tissue_sim::use_instruction_set(set);
+    return true;
+  }
+  return false;
+}
+
 bool read_arguments(int argc, char** argv, Arguments& arguments) {
   std::vector<std::string> files;
   for (int i = 1; i < argc; ++i) {
@@ -59,6 +74,10 @@ bool read_arguments(int argc, char** argv, Arguments& arguments) {
       arguments.options.timeline.state_period = std::llround(seconds * 1e9);
     } else if (word == "--hold" && read_seconds(argv[i], 0.0, seconds)) {
       arguments.options.hold = seconds;
+    } else if (word == "--hashes") {
+      arguments.options.hashes = argv[i];
+    } else if (word == "--instructions") {
+      if (!read_instructions(argv[i])) return false;
     } else if (word == "--threads") {
       if (!read_threads(argv[i], arguments.options.timeline.threads)) return false;
     } else {
@@ -203,12 +222,12 @@ void write_json(const ReplaySummary& s, const std::vector<ModelChoice>& choices,
 }  // namespace
 
 int main(int argc, char** argv) {
-  Arguments arguments;
-  if (!read_arguments(argc, argv, arguments)) {
-    std::cerr << usage;
-    return 2;
-  }
   try {
+    Arguments arguments;
+    if (!read_arguments(argc, argv, arguments)) {
+      std::cerr << usage;
+      return 2;
+    }
     std::vector<std::string> warnings;
     std::vector<ModelChoice> choices;
     const tissue_sim::Scene scene = tissue_sim::load_chosen_scene(arguments.scene, warnings, choices);

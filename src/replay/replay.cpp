@@ -156,6 +156,32 @@ class OutputBag {
   bool finished_ = false;
 };
 
+/// A line a step, where they are asked for.
+class HashFile {
+ public:
+  explicit HashFile(const std::string& path) : path_(path) {
+    if (!path.empty()) file_.open(path);
+    check();
+  }
+
+  void write(const StepReport& report, std::uint64_t hash) {
+    if (!path_.empty()) file_ << report.step << ' ' << report.stamp << ' ' << hash_text(hash) << '\n';
+  }
+
+  void finish() {
+    if (!path_.empty()) file_.close();
+    check();
+  }
+
+ private:
+  void check() const {
+    if (!file_) throw std::runtime_error(path_ + ": cannot be written: check the folder, its rights and its room");
+  }
+
+  std::string path_;
+  std::ofstream file_;
+};
+
 /// One replay from the first pose to the last.
 class Replay {
  public:
@@ -169,6 +195,8 @@ class Replay {
     tf2::BufferCore transforms(duration(input) + ros::Duration(10.0));
     read_transforms(input, options_.input, transforms);
 
+    HashFile hashes(options_.hashes);
+    hashes_ = &hashes;
     OutputBag output(options_.output);
     output_ = &output;
     rosbag::View poses(input, rosbag::TopicQuery(topics));
@@ -185,6 +213,7 @@ class Replay {
       while (timeline_.now() < until && timeline_.step_holding(until)) after_step(true);
     }
     if (!topologies_written_) write_topologies(0);
+    hashes.finish();
     output.finish();
     finish_summary();
     return std::move(summary_);
@@ -221,6 +250,7 @@ class Replay {
 
   void after_step(bool holding) {
     const StepReport& report = timeline_.report();
+    hashes_->write(report, timeline_.hash());
     step_ms_.push_back(report.profile.total * 1e3);
     step_seconds_ += report.profile.total;
     if (report.stamp > last_stamp_) simulated_nanoseconds_ += report.stamp - last_stamp_;
@@ -292,6 +322,7 @@ class Replay {
   Timeline timeline_;
   std::vector<FrameHistory> frames_;
   OutputBag* output_ = nullptr;  ///< for the length of run()
+  HashFile* hashes_ = nullptr;   ///< the same
   std::vector<std::uint32_t> topology_ids_;
   bool topologies_written_ = false;
   std::int64_t last_stamp_ = 0, simulated_nanoseconds_ = 0;

@@ -9,9 +9,9 @@ namespace tissue_sim {
 namespace {
 
 constexpr double idle_wait = 0.002;               // s the loop sleeps where nothing is to be done; adds to the latency
-constexpr double diagnostics_period = 1.0;        // s of wall time
-constexpr double poses_stopped_after = 0.25;      // s of wall time without a pose; then the counts are final
-constexpr double warning_period = 5.0;            // s of wall time between two warnings of one cause and topic
+constexpr double diagnostics_period = 1.0;        // s
+constexpr double poses_stopped_after = 0.25;      // s without a pose; then the counts are final
+constexpr double warning_period = 5.0;            // s between two warnings of one cause and topic
 constexpr int missing_transform = pose_verdicts;  // a cause beside the timeline's
 
 // advance: realtime stays this far behind the clock (ns), so that a pose that is late by less is still taken.
@@ -52,6 +52,12 @@ const char* cure(int cause) {
     default:
       return "";
   }
+}
+
+/// ns. Without a simulated clock one that nobody sets: the hour may be set while the node works.
+std::int64_t clock_now() {
+  return static_cast<std::int64_t>(ros::Time::isSimTime() ? ros::Time::now().toNSec()
+                                                          : ros::SteadyTime::now().toNSec());
 }
 
 /// The message to fill and publish. Published as a pointer, it goes to subscribers in this process without a copy, and
@@ -99,14 +105,17 @@ void Node::advertise() {
     const Instrument& instrument = scene_.instruments[i];
     inputs_[i].wrench = private_.advertise<geometry_msgs::WrenchStamped>(instrument.name + "/measured_cf", queue);
     const boost::function<void(const geometry_msgs::PoseStamped&)> take = [this, i](const auto& message) {
-      inputs_[i].waiting.push_back({message, ros::WallTime::now()});
-      last_pose_ = ros::WallTime::now();
+      inputs_[i].waiting.push_back({message, ros::SteadyTime::now()});
+      last_pose_ = ros::SteadyTime::now();
       pose_since_diagnostics_ = true;
     };
     inputs_[i].subscriber = node_.subscribe<geometry_msgs::PoseStamped>(
         instrument.pose_topic, queue, take, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay());
     ROS_INFO_STREAM("instrument \"" << instrument.name << "\" follows " << inputs_[i].subscriber.getTopic());
   }
+  const std::string own = ros::this_node::getName();
+  registration_ = std::make_unique<Registration>(std::vector<std::string>{
+      reset_server_.getService(), topology_server_.getService(), own + "/get_loggers", own + "/set_logger_level"});
 }
 
 void Node::spin() {
@@ -132,7 +141,7 @@ bool Node::take_poses() {
       if (into_scene_frame(transforms_, scene_.frame, waiting.front().message, pose, why)) {
         give_pose(i, pose);
         taken = true;
-      } else if ((ros::WallTime::now() - waiting.front().arrival).toSec() < parameters_.tf_timeout) {
+      } else if ((ros::SteadyTime::now() - waiting.front().arrival).toSec() < parameters_.tf_timeout) {
         break;
       } else {
         ++missing_transforms_;
@@ -157,8 +166,7 @@ void Node::give_pose(std::size_t instrument, const FramedPose& pose) {
     return;
   }
   input.frames.add(pose);
-  held_from_ = pose.in_scene.stamp;
-  held_since_ = ros::Time::now();
+  holding_.pose(pose.in_scene.stamp, clock_now());
 }
 
 /// Contacts and wrenches carry forces, markers show them.
@@ -181,8 +189,8 @@ void Node::step_while_poses_allow() {
 
 /// Where poses stop coming, simulated time goes on from the last one as fast as the clock, whatever the stamps are.
 void Node::hold_in_realtime() {
-  if (held_from_ == 0) return;
-  const std::int64_t until = held_from_ + (ros::Time::now() - held_since_).toNSec() - hold_off;
+  if (!holding_.begun()) return;
+  const std::int64_t until = holding_.until(clock_now(), hold_off);
   while (ros::ok() && poses_.isEmpty() && timeline_.now() < until && timeline_.step_holding(until)) {
     after_step(true);
     services_.callAvailable();
@@ -237,7 +245,7 @@ void Node::publish_markers() {
 }
 
 void Node::diagnose_when_due() {
-  const ros::WallTime now = ros::WallTime::now();
+  const ros::SteadyTime now = ros::SteadyTime::now();
   const bool stopped = pose_since_diagnostics_ && (now - last_pose_).toSec() > poses_stopped_after;
   if (!stopped && (now - last_diagnostics_).toSec() < diagnostics_period) return;
   if (diagnostics_.getNumSubscribers() > 0) publish_diagnostics();
@@ -330,8 +338,8 @@ void Node::publish_diagnostics() {
 }
 
 void Node::warn(std::size_t instrument, int cause, const std::string& what) {
-  const ros::WallTime now = ros::WallTime::now();
-  ros::WallTime& last = inputs_[instrument].last_warning[static_cast<std::size_t>(cause)];
+  const ros::SteadyTime now = ros::SteadyTime::now();
+  ros::SteadyTime& last = inputs_[instrument].last_warning[static_cast<std::size_t>(cause)];
   if ((now - last).toSec() < warning_period) return;
   last = now;
   ROS_WARN_STREAM(inputs_[instrument].subscriber.getTopic() << ": " << what);

@@ -60,8 +60,8 @@ Pose read_pose(const YamlMapping& yaml) {
   const Vector3 rpy = yaml.vector("rpy", Vector3::Zero());
   Pose pose;
   pose.position = yaml.vector("xyz", Vector3::Zero());
-  pose.orientation = Eigen::AngleAxisd(rpy.z(), Vector3::UnitZ()) * Eigen::AngleAxisd(rpy.y(), Vector3::UnitY()) *
-                     Eigen::AngleAxisd(rpy.x(), Vector3::UnitX());
+  pose.orientation =
+      turn(rpy.z(), Vector3::UnitZ()) * turn(rpy.y(), Vector3::UnitY()) * turn(rpy.x(), Vector3::UnitX());
   return pose;
 }
 

@@ -33,6 +33,21 @@ const char* to_string(PoseVerdict verdict) {
   return "";
 }
 
+void PoseQueue::push_back(const StampedPose& pose) {
+  if (empty()) clear();
+  // Moved to the front only when that makes as much room as it moves: each pose is moved once or twice.
+  if (poses_.size() == poses_.capacity() && 2 * first_ >= poses_.size()) {
+    poses_.erase(poses_.begin(), poses_.begin() + static_cast<std::ptrdiff_t>(first_));
+    first_ = 0;
+  }
+  poses_.push_back(pose);
+}
+
+void PoseQueue::clear() {
+  poses_.clear();
+  first_ = 0;
+}
+
 PoseVerdict judge_pose(StampedPose& pose, bool& normalised) {
   if (pose.stamp <= 0) return PoseVerdict::zero_stamp;
   if (pose.stamp > latest) return PoseVerdict::late_stamp;

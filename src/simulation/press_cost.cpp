@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tissue_sim/geometry/aabb_tree.h"
+#include "tissue_sim/geometry/elementary.h"
 
 namespace tissue_sim {
 
@@ -108,7 +109,7 @@ PressCost time_press(const Scene& scene, int organ, double seconds, Timeline& ti
     } else {
       slid += scene.time_step;
     }
-    const double aside = timed_part * depth * std::sin(timed_speed / (timed_part * depth) * slid);
+    const double aside = timed_part * depth * sine(timed_speed / (timed_part * depth) * slid);
     // Where a step takes long, those on the way in have to do.
     const bool counts = above <= -timed_part * depth || so_far > 0.5 * seconds;
     timeline.add_pose(0, {first_stamp + i * step, press.at(above, aside)});

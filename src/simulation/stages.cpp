@@ -43,10 +43,6 @@ class Lap {
   std::chrono::steady_clock::time_point start_;
 };
 
-double angle_between(const Pose& a, const Pose& b) {
-  return a.orientation.angularDistance(b.orientation);
-}
-
 /// m. How far a turn from one pose to the other moves a point of the box at most: less than by all of its reach where
 /// the box lies along the axis, as a shaft that spins about itself.
 double way_of_turn(const InstrumentSurface& surface, const Pose& from, const Pose& to) {
@@ -222,6 +218,22 @@ bool all_awake(const std::vector<ContactPoint>& points, const OrganState& state)
   return true;
 }
 
+/// Their lists grow to this sooner or later; from the start, since the first time may come after hours.
+void make_room(Detection& detection, Penetration& penetration) {
+  detection.crossings.reserve(usual_contacts);
+  detection.crossed_edges.reserve(usual_contacts);
+  detection.unordered.reserve(usual_contacts);
+  detection.pairs.reserve(usual_contacts);
+  for (std::vector<int>* list :
+       {&detection.border, &detection.border_outside, &detection.colliding, &detection.stack,
+        &detection.tree_room.stack, &detection.tree_room.leaves, &penetration.layer, &penetration.next_layer}) {
+    list->reserve(usual_contacts);
+  }
+  detection.tree_room.near.reserve(usual_contacts);
+  detection.tree_room.edges.resize(usual_contacts);
+  detection.tree_room.visits.resize(usual_contacts);
+}
+
 }  // namespace
 
 Workspace build_workspace(const World& world, int threads) {
@@ -241,6 +253,7 @@ Workspace build_workspace(const World& world, int threads) {
     for (std::size_t p = 0; p < world.pieces.size(); ++p) {
       prepare(work.detections[p], surface);
       prepare(work.penetrations[p], surface);
+      make_room(work.detections[p], work.penetrations[p]);
     }
     work.accelerations.assign(rest.positions.size(), Vector3::Zero());
     if (rest.elastic()) work.pressing_of.assign(count_memories(world, rest), -1);

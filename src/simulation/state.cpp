@@ -39,6 +39,7 @@ OrganState rest_state(const World& world, int organ) {
     for (std::vector<char>& memory : state.colliding) memory.assign(vertices, 0);
   }
   state.touching.resize(world.pieces.size());
+  for (std::vector<int>& touching : state.touching) touching.reserve(usual_contacts);
   for (const InstrumentPiece& piece : world.pieces) state.clearances.emplace_back(piece.surface.vertices.size());
   if (!model.regions.empty()) rest_levels(model, world.pieces.size(), state);
   state.pressing.reserve(usual_contacts);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "tissue_sim/geometry/elementary.h"
 #include "tissue_sim/tissue/energy.h"
 
 namespace tissue_sim {
@@ -162,7 +163,7 @@ void Descent::start(const Vector3& gravity) {
     for (int i = 0; i < point.bearers.count; ++i) {
       const int v = point.bearers.vertices[i];
       if (!moves(v)) continue;
-      yielding += std::pow(point.bearers.weights[i], 2) / (organ_.incidence.stiffness[v] + inertia(v));
+      yielding += square(point.bearers.weights[i]) / (organ_.incidence.stiffness[v] + inertia(v));
       room_.pressing.push_back({static_cast<int>(p), point.bearers.weights[i], room_.first_of[v], false});
       room_.first_of[v] = static_cast<int>(room_.pressing.size()) - 1;
     }
@@ -237,7 +238,7 @@ Vector3 Descent::free_step(int v, LocalStiffness& local, Matrix3& inverse) {
       if (!pressing.active) continue;
       const double behind = point.target - point.direction.dot(at_point(point, state_.positions));
       local.gradient -= pressing.weight * (point.force + point.stiffness * behind) * point.direction;
-      local.block += std::pow(pressing.weight, 2) * point.stiffness * point.direction * point.direction.transpose();
+      local.block += square(pressing.weight) * point.stiffness * point.direction * point.direction.transpose();
       pressed = true;
     }
     if (!pressed) break;

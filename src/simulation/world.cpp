@@ -1,9 +1,9 @@
 #include "tissue_sim/simulation/world.h"
 
 #include <algorithm>
-#include <cmath>
 #include <sstream>
 
+#include "tissue_sim/geometry/elementary.h"
 #include "tissue_sim/simulation/integrator.h"
 #include "tissue_sim/simulation/vertex_block_descent.h"
 #include "tissue_sim/tissue/coarse_shell.h"
@@ -38,7 +38,7 @@ constexpr double largest_wall_part = 0.2;
 /// 4. That shell all awake is too soft there by 9-12 % at a tolerance of 5 %, and by 7-8 % at 3 %. With the two
 /// together the force was within 5 % of that of the organ's own mesh all awake: 8 lengths at 5 %, 9 at 3 %, 10 at 2 %.
 double wall_region_lengths(double tolerance) {
-  return 8.0 + 2.0 * std::log(0.05 / tolerance);
+  return 8.0 + 2.0 * natural_logarithm(0.05 / tolerance);
 }
 
 /// To two digits, downwards: what an error says would do must do.
@@ -51,7 +51,7 @@ void refuse_if_too_stiff(const Scene& scene, const Organ& organ, const RestShape
   const int substeps = substeps_for(rest, scene.time_step);
   if (substeps <= scene.max_substeps) return;
   const double time_step = rest.stable_substep * scene.max_substeps;
-  const double softer = std::pow(time_step / scene.time_step, 2);
+  const double softer = square(time_step / scene.time_step);
   std::ostringstream line;
   line.precision(2);
   line << "organ " << organ.name << ": a step of " << scene.time_step << " s needs " << substeps << " substeps of "

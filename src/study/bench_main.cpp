@@ -38,6 +38,11 @@ constexpr Command commands[] = {
      "                               and displacement; of the bundled liver's tetrahedra cut finer, or of FILE\n"},
     {"load", bench_load,
      "  load                         an organ of 100,000 and one of 1,000,000 triangles, from file to first step\n"},
+    {"soak", bench_soak,
+     "  soak [--thousands N]         3,600 thousand steps with contact: memory, allocations and the slowest steps, "
+     "which "
+     "stay\n"
+     "                               as they were, or the status is 1\n"},
 };
 
 void print_usage(std::FILE* file) {
@@ -84,6 +89,10 @@ int main(int argc, char** argv) {
   }
   if (!path.empty() && !write_json(path, command->name, json)) {
     std::fprintf(stderr, "tissue_sim_bench: %s cannot be written: check the folder and its rights\n", path.c_str());
+    return 1;
+  }
+  if (!json.fault.empty()) {
+    std::fprintf(stderr, "tissue_sim_bench %s: %s\n", command->name, json.fault.c_str());
     return 1;
   }
   return 0;

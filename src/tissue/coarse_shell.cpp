@@ -5,6 +5,7 @@
 
 #include "tissue_sim/geometry/aabb_tree.h"
 #include "tissue_sim/geometry/coarsening.h"
+#include "tissue_sim/geometry/elementary.h"
 #include "tissue_sim/tissue/material.h"
 
 namespace tissue_sim {
@@ -63,7 +64,7 @@ std::vector<double> curvatures(const TriangleMesh& mesh) {
       const int a = t[i];
       const int b = t[(i + 1) % 3];
       const Vector3 along = mesh.vertices[b] - mesh.vertices[a];
-      squares[a] += std::pow((normals[b] - normals[a]).dot(along) / along.squaredNorm(), 2);
+      squares[a] += square((normals[b] - normals[a]).dot(along) / along.squaredNorm());
       ++edges[a];
     }
   }
@@ -153,11 +154,12 @@ double bending_length(const Organ& organ) {
   const WallStiffness wall = wall_stiffness(organ.material, organ.wall_thickness);
   const double flattest = 1.0 / (largest_radius * bounds_of(organ.mesh.vertices).size().norm());
   const double radius = 1.0 / std::max(flattest, median(curvatures(organ.mesh)));
-  return std::pow(wall.bending / wall.membrane * radius * radius, 0.25);
+  return std::sqrt(std::sqrt(wall.bending / wall.membrane * radius * radius));
 }
 
 double shell_edge(const Organ& organ) {
-  return std::hypot(own_edge(organ), std::sqrt(*organ.levels_tolerance / error_at_one) * bending_length(organ));
+  const double bending = std::sqrt(*organ.levels_tolerance / error_at_one) * bending_length(organ);
+  return std::sqrt(square(own_edge(organ)) + square(bending));
 }
 
 CoarseShell coarse_shell(const Organ& organ) {

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "constraint_lanes.h"
+#include "tissue_sim/geometry/elementary.h"
 #include "tissue_sim/tissue/neo_hookean_corners.h"
 
 namespace tissue_sim {
@@ -45,10 +46,6 @@ class Filler {
 
 float float_of(double value) {
   return static_cast<float>(value);
-}
-
-double square(double value) {
-  return value * value;
 }
 
 template <std::size_t rows>

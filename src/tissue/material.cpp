@@ -1,6 +1,8 @@
 #include "tissue_sim/tissue/material.h"
 
-#include <cmath>
+#include <algorithm>
+
+#include "tissue_sim/geometry/elementary.h"
 
 namespace tissue_sim {
 
@@ -12,7 +14,7 @@ WallStiffness wall_stiffness(const Material& material, double wall_thickness) {
   const double lambda = wall.membrane * nu / (1.0 - nu * nu);
   wall.distance = 8.0 * mu;
   wall.area = std::max(0.0, lambda - mu);  // 1/3 rounds to a hair below zero
-  wall.bending = material.young * std::pow(wall_thickness, 3) / (12.0 * (1.0 - nu * nu));
+  wall.bending = material.young * cube(wall_thickness) / (12.0 * (1.0 - nu * nu));
   return wall;
 }
 

@@ -241,28 +241,6 @@ NeoHookeanSolid pack(const std::vector<NeoHookeanElement>& elements) {
   return solid;
 }
 
-bool available(InstructionSet set) {
-#ifdef __x86_64__
-  if (set == InstructionSet::avx2) return __builtin_cpu_supports("avx2") != 0;
-  if (set == InstructionSet::avx512) {
-    return available(InstructionSet::avx2) && __builtin_cpu_supports("avx512f") != 0 &&
-           __builtin_cpu_supports("avx512vl") != 0;
-  }
-#endif
-  return set == InstructionSet::baseline;
-}
-
-InstructionSet instruction_set() {
-  static const InstructionSet fastest = available(InstructionSet::avx512) ? InstructionSet::avx512
-                                        : available(InstructionSet::avx2) ? InstructionSet::avx2
-                                                                          : InstructionSet::baseline;
-  return fastest;
-}
-
-const char* name(InstructionSet set) {
-  return set == InstructionSet::avx512 ? "avx512" : set == InstructionSet::avx2 ? "avx2" : "baseline";
-}
-
 void add_neo_hookean_forces(const NeoHookeanSolid& solid, const float* displacements, float* forces,
                             InstructionSet set) {
   add_chosen(solid, BatchesInARow{0, solid.batches.size()}, displacements, forces, set);

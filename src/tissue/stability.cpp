@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "tissue_sim/geometry/elementary.h"
+
 namespace tissue_sim {
 
 namespace {
@@ -256,7 +258,7 @@ double fastest_frequency(const RestShape& shape) {
 }
 
 double stable_substep(const RestShape& shape, double safety, double damping_safety) {
-  const double omega_squared = std::pow(shape.fastest_frequency, 2);
+  const double omega_squared = square(shape.fastest_frequency);
   const std::vector<Vector3> gradient = enclosed_gradient(shape);
   const double lambda = shape.damping_time * omega_squared +
                         largest_eigenvalue(shape, [&](const std::vector<Vector3>& x, std::vector<Vector3>& y) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tissue_sim/geometry/elementary.h"
 #include "tissue_sim/tissue/material.h"
 
 namespace tissue_sim {
@@ -87,14 +88,14 @@ void add_flaps(const WallStiffness& wall, const std::vector<double>& areas, doub
     }
     ElementVectors<VolumeElement> gradient;
     element.rest = element.evaluate(x, gradient);
-    element.scale = std::max(std::abs(element.rest), smallest_volume * std::pow(six_edges / 6.0, 3));
+    element.scale = std::max(std::abs(element.rest), smallest_volume * cube(six_edges / 6.0));
 
     const double length = std::max(edge_length(shape, edge), shortest_length * mean_edge);
     const double area_1 = std::max(areas[t1], smallest_area * mean_area);
     const double area_2 = std::max(areas[t2], smallest_area * mean_area);
     const double volume_per_angle = 2.0 * area_1 * area_2 / (3.0 * length);
     const double hinge = wall.bending * length * length / (area_1 + area_2);
-    element.stiffness = hinge * std::pow(element.scale / volume_per_angle, 2);
+    element.stiffness = hinge * square(element.scale / volume_per_angle);
     shape.volumes.push_back(element);
   }
 }

@@ -9,8 +9,10 @@
 
 #include <cstdlib>
 #include <fstream>
+#include <set>
 
 #include "tissue_sim/geometry/primitives.h"
+#include "tissue_sim/ros/messages.h"
 
 namespace tissue_sim {
 namespace {
@@ -46,7 +48,7 @@ class ReplayTest : public testing::Test {
     options.output = folder + "/out.bag";
   }
   void TearDown() override {
-    for (const char* name : {"/in.bag", "/out.bag", "/cut.bag"}) unlink((folder + name).c_str());
+    for (const char* name : {"/in.bag", "/out.bag", "/cut.bag", "/hashes.txt"}) unlink((folder + name).c_str());
     rmdir(folder.c_str());
   }
 
@@ -106,6 +108,28 @@ TEST_F(ReplayTest, TwiceIsTheSame) {
   record("test/measured_cp");
   const std::uint64_t first = replay(ball_scene(), options).hash;
   EXPECT_EQ(replay(ball_scene(), options).hash, first);
+}
+
+TEST_F(ReplayTest, WritesAHashAStep) {
+  record("test/measured_cp");
+  options.hashes = folder + "/hashes.txt";
+  const ReplaySummary summary = replay(ball_scene(), options);
+  std::ifstream file(options.hashes);
+  std::uint64_t steps = 0;
+  std::uint64_t step = 0;
+  std::int64_t stamp = 0;
+  std::string hash;
+  std::set<std::string> different;
+  while (file >> step >> stamp >> hash) {
+    EXPECT_EQ(step, ++steps);
+    EXPECT_EQ(stamp, 100'000'000'000 + (static_cast<std::int64_t>(steps) - 1) * 1'000'000);
+    different.insert(hash);
+  }
+  EXPECT_EQ(steps, summary.steps);
+  EXPECT_EQ(different.size(), steps) << "each is of all states so far";
+  EXPECT_EQ(hash, hash_text(summary.hash));
+  options.hashes = folder + "/nowhere/hashes.txt";
+  EXPECT_NE(refusal().find("nowhere/hashes.txt: cannot be written"), std::string::npos) << refusal();
 }
 
 TEST_F(ReplayTest, HoldGoesOnAfterTheLastPose) {

@@ -12,6 +12,8 @@ from geometry_msgs.msg import PoseStamped
 SCENES = os.path.join(os.path.dirname(os.path.realpath(__file__)), '..', 'scenes')
 SPHERE_SCENE = os.path.realpath(os.path.join(SCENES, 'ros_sphere.yaml'))
 POSE_TOPIC = 'test/measured_cp'
+# Long runs, as doc/reliability.md has them, instead of the same in seconds.
+LONG = os.environ.get('TISSUE_SIM_LONG') == '1'
 BALL_RADIUS = 0.03   # m, of the organ in ros_sphere.yaml, around the origin
 PROBE_RADIUS = 0.005  # m, of the probe, around its tip
 
@@ -42,6 +44,12 @@ def pose_message(stamp, position, orientation=(0, 0, 0, 1), frame='world'):
     (message.pose.orientation.x, message.pose.orientation.y, message.pose.orientation.z,
      message.pose.orientation.w) = orientation
     return message
+
+
+def resident_memory(process):
+    """Bytes."""
+    with open('/proc/%d/statm' % process.pid) as statm:
+        return int(statm.read().split()[1]) * os.sysconf('SC_PAGESIZE')
 
 
 def stamp_of(message):

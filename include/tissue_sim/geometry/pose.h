@@ -17,11 +17,13 @@ inline Pose operator*(const Pose& parent, const Pose& child) {
   return {parent.apply(child.position), (parent.orientation * child.orientation).normalized()};
 }
 
+/// A turn by `angle` (rad) about a unit axis, counterclockwise as seen against it.
+Eigen::Quaterniond turn(double angle, const Eigen::Vector3d& axis);
+
+/// rad, of the shorter arc from one orientation to the other.
+double angle_between(const Pose& a, const Pose& b);
+
 /// Position on the line, rotation by slerp over the shorter arc. The ends come out exactly.
-inline Pose interpolate(const Pose& from, const Pose& to, double fraction) {
-  if (fraction <= 0.0) return from;
-  if (fraction >= 1.0) return to;
-  return {from.position + fraction * (to.position - from.position), from.orientation.slerp(fraction, to.orientation)};
-}
+Pose interpolate(const Pose& from, const Pose& to, double fraction);
 
 }  // namespace tissue_sim

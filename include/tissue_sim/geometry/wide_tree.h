@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tissue_sim/geometry/closest_point.h"
+#include "tissue_sim/geometry/instruction_set.h"
 
 namespace tissue_sim {
 
@@ -15,6 +16,8 @@ enum class Registers { narrow, wide, widest };
 
 /// Whether this build has code for it and this processor can run it. `narrow` always is.
 bool available(Registers registers);
+
+/// What instruction_set() has.
 Registers widest_registers();
 
 /// A point in single precision, rounded; the fourth number is nothing.

@@ -11,7 +11,9 @@ namespace tissue_sim {
 struct ReplayOptions {
   std::string input;   ///< bag with the poses; its /tf and /tf_static are used where it has them
   std::string output;  ///< bag to write
-  double hold = 0.0;   ///< s to step on after the last pose, with every instrument held where it is
+  std::string
+      hashes;  ///< text file to write, a line a step: its number, its stamp (ns), Timeline::hash() after it; or empty
+  double hold = 0.0;  ///< s to step on after the last pose, with every instrument held where it is
   TimelineOptions timeline;
 };
 
@@ -46,7 +48,7 @@ struct ReplaySummary {
   double ms_per_contact_step_p50 = 0.0;  ///< over the steps with a contact
   std::vector<ReplayOrgan> organs;
   double real_time_factor = 0.0;  ///< simulated seconds by the seconds that the steps took
-  std::uint64_t hash = 0;         ///< Timeline::hash() at the end
+  std::uint64_t hash = 0;         ///< Timeline::hash() at the end: of every step's state
   std::vector<ReplayRow> rows;    ///< one for each stamp on which a pose was reached
   std::vector<std::string> warnings;
 

@@ -6,11 +6,14 @@
 
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "tissue_sim/ros/frames.h"
+#include "tissue_sim/ros/holding.h"
 #include "tissue_sim/ros/messages.h"
+#include "tissue_sim/ros/registration.h"
 #include "tissue_sim/ros/transform_feed.h"
 #include "tissue_sim/simulation/accuracy.h"
 #include "tissue_sim/simulation/timeline.h"
@@ -22,7 +25,7 @@ struct NodeParameters {
   std::string scene;      ///< path of the scene file
   bool realtime = false;  ///< advance: realtime instead of on_pose
   bool keep_all_poses = false;
-  double tf_timeout = 0.1;  ///< s of wall time that a pose waits for its transform
+  double tf_timeout = 0.1;  ///< s that a pose waits for its transform
   TimelineOptions timeline;
 };
 
@@ -31,7 +34,7 @@ NodeParameters read_parameters();
 
 /// Instrument poses in, organs, contacts and forces out: topics and services around a Timeline.
 ///
-/// One thread reads poses, steps, publishes and serves; only tf2 and the clock have threads of their own.
+/// One thread reads poses, steps, publishes and serves; only tf2, the clock and the registration have their own.
 class Node {
  public:
   explicit Node(const NodeParameters& parameters);
@@ -42,7 +45,7 @@ class Node {
  private:
   struct Waiting {
     geometry_msgs::PoseStamped message;
-    ros::WallTime arrival;
+    ros::SteadyTime arrival;
   };
 
   /// What the node keeps of an instrument.
@@ -52,7 +55,7 @@ class Node {
     boost::shared_ptr<geometry_msgs::WrenchStamped> wrench_message;  ///< see writable()
     std::deque<Waiting> waiting;  ///< for their transform, in the order in which they came
     FrameHistory frames;
-    std::vector<ros::WallTime> last_warning = std::vector<ros::WallTime>(pose_verdicts + 1);  ///< by cause
+    std::vector<ros::SteadyTime> last_warning = std::vector<ros::SteadyTime>(pose_verdicts + 1);  ///< by cause
   };
 
   /// What the node keeps of an organ.
@@ -94,11 +97,9 @@ class Node {
   ros::Publisher contacts_, markers_, diagnostics_;
   boost::shared_ptr<Contacts> contacts_message_;  ///< see writable()
   ros::ServiceServer reset_server_, topology_server_;
+  std::unique_ptr<Registration> registration_;
 
-  // The clock at the last pose, for advance: realtime.
-  std::int64_t held_from_ = 0;  ///< ns, stamp of the newest pose
-  ros::Time held_since_;
-
+  Holding holding_;  ///< for advance: realtime
   // Since the last diagnostics.
   StepProfile profile_;
   std::uint64_t period_steps_ = 0;
@@ -107,7 +108,7 @@ class Node {
   std::uint64_t missing_transforms_ = 0;
   std::uint64_t reported_drops_ = 0, reported_recoveries_ = 0;
   bool pose_since_diagnostics_ = false;
-  ros::WallTime last_diagnostics_, last_pose_;
+  ros::SteadyTime last_diagnostics_, last_pose_;
 };
 
 }  // namespace tissue_sim

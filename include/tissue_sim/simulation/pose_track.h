@@ -1,8 +1,9 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
-#include <deque>
+#include <vector>
 
 #include "tissue_sim/geometry/pose.h"
 
@@ -26,12 +27,27 @@ constexpr std::array<PoseVerdict, 6> dropped_verdicts{PoseVerdict::zero_stamp,  
                                                       PoseVerdict::non_finite,      PoseVerdict::too_far,
                                                       PoseVerdict::zero_quaternion, PoseVerdict::stale};
 
+/// Poses in the order of their stamps. Keeps its room: a std::deque takes a new block from the heap every few poses.
+class PoseQueue {
+ public:
+  bool empty() const { return first_ == poses_.size(); }
+  std::size_t size() const { return poses_.size() - first_; }
+  const StampedPose& front() const { return poses_[first_]; }
+  void push_back(const StampedPose& pose);
+  void pop_front() { ++first_; }
+  void clear();
+
+ private:
+  std::vector<StampedPose> poses_;
+  std::size_t first_ = 0;  ///< those before it are gone
+};
+
 /// The poses of one instrument: where it is, and where it will be.
 struct PoseTrack {
-  bool placed = false;            ///< it has been given a pose that time has reached
-  Pose pose;                      ///< at the time the simulation has reached
-  std::int64_t newest = 0;        ///< ns, the last stamp that was taken; 0: none
-  std::deque<StampedPose> ahead;  ///< later than the time the simulation has reached
+  bool placed = false;      ///< it has been given a pose that time has reached
+  Pose pose;                ///< at the time the simulation has reached
+  std::int64_t newest = 0;  ///< ns, the last stamp that was taken; 0: none
+  PoseQueue ahead;          ///< later than the time the simulation has reached
 };
 
 /// What a pose is worth in itself: `used`, or why not. Normalises the quaternion; `normalised` is set to true where

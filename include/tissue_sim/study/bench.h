@@ -34,5 +34,6 @@ bool bench_limits(BenchWords words, JsonRows& json);
 bool bench_elements(BenchWords words, JsonRows& json);
 bool bench_levels(BenchWords words, JsonRows& json);
 bool bench_load(BenchWords words, JsonRows& json);
+bool bench_soak(BenchWords words, JsonRows& json);
 
 }  // namespace tissue_sim

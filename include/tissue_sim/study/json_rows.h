@@ -19,6 +19,7 @@ __attribute__((format(printf, 1, 2))) inline std::string text(const char* format
 /// The rows of a `--json` file as they are made; nothing is written before all of them are there.
 struct JsonRows {
   std::string rows;
+  std::string fault;  ///< what should hold and does not: the program says it and its status is 1
   void add(const std::string& row) { rows += (rows.empty() ? "\n    {" : ",\n    {") + row + "}"; }
 };
 

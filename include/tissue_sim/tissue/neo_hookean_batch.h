@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "tissue_sim/geometry/instruction_set.h"
 #include "tissue_sim/tissue/neo_hookean.h"
 
 namespace tissue_sim {
@@ -32,21 +33,6 @@ struct BatchRange {
   std::size_t first = 0;
   std::size_t count = 0;
 };
-
-/// Which registers forces are computed in: 16 bytes wide, which every x86-64 has (and other processors by the
-/// compiler's own means), or 32, or with AVX-512 32 and twice as many of them, which distances, areas and volumes have
-/// use for (see constraint_batch.h) and tetrahedra are not compiled for. All give the same bits: the lanes do not meet,
-/// and forces are added in the order of the elements. On a Zen 4 core they take 9.4 and 6.5 ns a tetrahedron; 64 bytes
-/// took 5.8, too little for a third.
-enum class InstructionSet { baseline, avx2, avx512 };
-
-/// Whether this build has code for it and this processor can run it. `baseline` always is.
-bool available(InstructionSet set);
-
-/// The fastest that is available.
-InstructionSet instruction_set();
-
-const char* name(InstructionSet set);
 
 /// Adds the force (N) of every tetrahedron to its vertices, in single precision. `displacements` and `forces` hold four
 /// floats a vertex, of which the fourth is not read and not changed (but -0 becomes 0).
