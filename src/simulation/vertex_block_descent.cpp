@@ -18,9 +18,9 @@ constexpr double sweep_period = 1e-3;
 /// vertices in the places where the first sweep put them.
 constexpr double shared_stiffness = 2.0;
 
-/// Times the fastest vibration's angle in a step: from here on a step may start at a part of its way only. With 1 ms
-/// tissue of 5.4 kPa on edges of 5 mm is at 4, and starts at the end of its way as it always did.
-constexpr double long_step = 5.0;
+/// The fastest vibration's angle in a step from which on a step may start at a part of its way only. Blocks of nu 0.499
+/// went bad from 4.6 on, walls from 7.
+constexpr double long_step = 2.0;
 
 /// Constraint elements at vertex v. Damped along their gradient by what all their vertices moved since the start.
 template <class Kind>

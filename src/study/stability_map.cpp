@@ -225,7 +225,7 @@ StabilityRow try_cell(const Scenes& scenes, const StabilityCell& cell) {
   row.reason = refused;
   row.time_step = step_that_would_do(refused);
   if (!(row.time_step > 0.0)) {
-    const bool material = refused.find(": poisson: ") != std::string::npos;
+    const bool material = refused.find(".poisson: ") != std::string::npos;
     row.outcome = material ? Outcome::other_material : Outcome::neither_of_these;
     return row;
   }
