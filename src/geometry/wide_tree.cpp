@@ -89,9 +89,9 @@ TISSUE_SIM_INLINE void cross(const Three<Lane>& a, const Three<Lane>& b, Three<L
   product.z = a.x * b.y - a.y * b.x;
 }
 
-/// Of eight packed triangles, from `first` on, whose boxes overlap the edge's: those whose rims the line p-q does not surely pass on
-/// different sides. `within` becomes those of which it surely passes all rims on the same side: farther from them than
-/// what hit_edge_triangle() takes for rounding.
+/// Of eight packed triangles, from `first` on, whose boxes overlap the edge's: those whose rims the line p-q does not
+/// surely pass on different sides. `within` becomes those of which it surely passes all rims on the same side: farther
+/// from them than what hit_edge_triangle() takes for rounding.
 ///
 /// Coordinates up to `farthest` are rounded, so the differences below, up to `length` long, are wrong by 3 farthest *
 /// rounding each, and what is made of them by less than farthest * length * (54 * along + 24 * length) * rounding,
@@ -421,7 +421,8 @@ __attribute__((target("avx2"))) void find_pairs_widest(const WideTree& tree, con
 }
 #endif
 
-/// A float that is no smaller. Where only infinity is, no distance is too far, not even one that is too large for a float.
+/// A float that is no smaller. Where only infinity is, no distance is too far, not even one that is too large for a
+/// float.
 TISSUE_SIM_INLINE float rounded_up(double value) {
   constexpr double largest = std::numeric_limits<float>::max();
   constexpr double smallest = std::numeric_limits<float>::min();
@@ -494,8 +495,8 @@ TISSUE_SIM_INLINE void closest(const WideTree& tree, const Vector3& from, Closes
     alignas(32) WideTree::Row distances;
     unsigned near = squared_distances<Lane>(node, p, slack, enough, distances);
     if (node.leaf >= 0) {
-      near &= plane_distances<Lane>(tree.leaves[static_cast<std::size_t>(node.leaf)], p, slack_of_plane, enough,
-                                    distances);
+      near &=
+          plane_distances<Lane>(tree.leaves[static_cast<std::size_t>(node.leaf)], p, slack_of_plane, enough, distances);
     }
     const std::size_t bottom = waiting;
     for (; near != 0; near &= near - 1) {
@@ -659,7 +660,8 @@ struct Builder {
   /// Zero also where rounding leaves so little of a sliver's plane that its corners are not on it.
   static Vector3 plane_normal(const Vector3& a, const Vector3& b, const Vector3& c) {
     const Vector3 normal = area_normal(a, b, c).stableNormalized();
-    const double size = std::max({a.lpNorm<Eigen::Infinity>(), b.lpNorm<Eigen::Infinity>(), c.lpNorm<Eigen::Infinity>()});
+    const double size =
+        std::max({a.lpNorm<Eigen::Infinity>(), b.lpNorm<Eigen::Infinity>(), c.lpNorm<Eigen::Infinity>()});
     const double off = std::max(std::abs(normal.dot(b - a)), std::abs(normal.dot(c - a)));
     return off <= static_cast<double>(rounding) * size ? normal : Vector3(Vector3::Zero());
   }
