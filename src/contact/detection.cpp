@@ -77,8 +77,8 @@ void gather_pairs(const OrganSurface& organ, const InstrumentSurface& instrument
     }
     const auto count = static_cast<std::size_t>(edges.end(patch) - edges.begin(patch));
     const Edge* ends = organ.patches.ends.data() + edges.first[patch];
-    find_crossing_pairs(instrument.tree, {d.rounded.data(), points, ends, edges.begin(patch), count},
-                        d.tree_room, d.pairs);
+    find_crossing_pairs(instrument.tree, {d.rounded.data(), points, ends, edges.begin(patch), count}, d.tree_room,
+                        d.pairs);
   });
 }
 

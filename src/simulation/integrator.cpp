@@ -350,8 +350,7 @@ void for_each_two_free(const RestShape& rest, const OrganState& state, VisitTwo&
 void accelerate(const OrganModel& organ, const Vector3& gravity, double dt, const std::vector<Vector3>& forces,
                 OrganState& state) {
   const double slowed = 1.0 / (1.0 + dt * organ.drag);
-  const Two gravity_of[3] = {
-      {gravity.x(), gravity.y()}, {gravity.z(), gravity.x()}, {gravity.y(), gravity.z()}};
+  const Two gravity_of[3] = {{gravity.x(), gravity.y()}, {gravity.z(), gravity.x()}, {gravity.y(), gravity.z()}};
   const auto accelerate_two = [&](std::size_t v) {
     const double mass = organ.rest.inverse_mass[v];
     const double next = organ.rest.inverse_mass[v + 1];

@@ -200,6 +200,24 @@ TEST(SurfacePatches, CarriedVerticesArePlacedBeforeAnybodyLooksAtThemAndOnce) {
   EXPECT_LT(carried.asked, 100 * 30) << "of 128 patches each time";
 }
 
+TEST(SurfacePatches, SayWhereTheEndsOfTheirEdgesAre) {
+  const PatchedOrgan organ(make_octasphere(0.03, 4));
+  const SurfacePatches& patches = organ.patches;
+  ASSERT_EQ(patches.ends.size(), organ.topology.edges.size());
+  for (int patch = 0; patch < organ.count(); ++patch) {
+    const int* vertices = patches.edge_vertices.begin(patch);
+    std::set<int> used;
+    for (const int* e = patches.edges.begin(patch); e != patches.edges.end(patch); ++e) {
+      for (std::size_t i = 0; i < 2; ++i) {
+        const int end = patches.ends[static_cast<std::size_t>(e - patches.edges.items.data())][i];
+        EXPECT_EQ(vertices[end], organ.topology.edges[*e][i]);
+        used.insert(end);
+      }
+    }
+    EXPECT_EQ(used.size(), static_cast<std::size_t>(patches.edge_vertices.end(patch) - vertices)) << "no others";
+  }
+}
+
 TEST(SurfacePatches, AVertexThatIsNoNumberHidesNoOther) {
   Random random(3);
   PatchedOrgan organ(make_octasphere(0.03, 3));

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numeric>
 #include <set>
 
@@ -230,6 +231,35 @@ TEST(WideTree, ClosestPointIsThatOfBruteForceToTheBit) {
           EXPECT_EQ(closest.on.point, plain.best.on.point);
         }
       }
+    }
+  }
+}
+
+/// What rounding has left of a sliver's plane may miss its own corners: then it must not tell how far the sliver is.
+TEST(WideTree, ThePlanesOfSliversHideNothing) {
+  Random random(8);
+  TriangleMesh mesh;
+  for (int t = 0; t < 200; ++t) {
+    const Vector3 a = Vector3::Constant(1.0) + random_point(random, 0.01);
+    const Vector3 along = random_point(random, 0.002);
+    const double thickness = std::pow(10.0, random_in(random, -19.0, -5.0));
+    const Vector3 c = a + random_in(random, 0.0, 1.0) * along + random_point(random, thickness);
+    const int first = static_cast<int>(mesh.vertices.size());
+    mesh.vertices.insert(mesh.vertices.end(), {a, a + along, c});
+    mesh.triangles.push_back({first, first + 1, first + 2});
+  }
+  const WideTree tree = build_wide_tree(mesh.vertices, mesh.triangles);
+  for (int i = 0; i < 2000; ++i) {
+    const Triangle& corners = mesh.triangles[static_cast<std::size_t>(i) % mesh.triangles.size()];
+    const double share = random_in(random, 0.0, 1.0);
+    const Vector3 on = (1.0 - share) * mesh.vertices[corners[0]] + share * mesh.vertices[corners[1]];
+    const Vector3 p = on + random_point(random, std::pow(10.0, random_in(random, -12.0, -3.0)));
+    ClosestSearch plain(mesh.vertices, mesh.triangles, p, 1.0);
+    for (int t = 0; t < static_cast<int>(mesh.triangles.size()); ++t) plain.look_at(t);
+    for (const Registers registers : all_registers()) {
+      const ClosestOnMesh closest = closest_on_mesh(mesh.vertices, mesh.triangles, tree, p, 1.0, -1, registers);
+      ASSERT_EQ(closest.triangle, plain.best.triangle);
+      EXPECT_EQ(closest.squared_distance, plain.best.squared_distance);
     }
   }
 }

@@ -63,7 +63,7 @@ struct Detection {
   std::vector<Side> side;    ///< per vertex, where side_stamp is the current one
   std::vector<int> nearest;  ///< per vertex: the triangle of the instrument found last, or -1; a guess for the next
                              ///< search, which makes it shorter and changes nothing else
-  std::vector<FreeBall> free_balls;       ///< per patch: around where its middle was when that was last asked for
+  std::vector<FreeBall> free_balls;     ///< per patch: around where its middle was when that was last asked for
   std::vector<FloatPoint> rounded;      ///< of `local`, those of the ends of a patch's edges
   std::vector<EdgeTrianglePair> pairs;  ///< that may cross
   std::vector<PlaneHit> hits;           ///< of these: where the plane is crossed

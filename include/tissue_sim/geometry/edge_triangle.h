@@ -25,8 +25,8 @@ inline EdgeTriangleHit hit_plane(const Vector3& p, const Vector3& q, const Vecto
   const double height_p = normal.dot(p - corner);
   const double height_q = normal.dot(q - corner);
   const double t = height_p / (height_p - height_q);
-  const int hits = static_cast<int>((height_p < 0.0) != (height_q < 0.0)) & static_cast<int>(t >= 0.0) &
-                   static_cast<int>(t <= 1.0);
+  const int hits =
+      static_cast<int>((height_p < 0.0) != (height_q < 0.0)) & static_cast<int>(t >= 0.0) & static_cast<int>(t <= 1.0);
   return {hits * (2 * static_cast<int>(height_p < 0.0) - 1), t};
 }
 

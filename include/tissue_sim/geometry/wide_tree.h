@@ -33,13 +33,14 @@ struct WideTree {
   static constexpr std::size_t lanes = 8;
   using Row = std::array<float, lanes>;
 
-  /// Lanes without a child are boxes that nothing overlaps. The children of a leaf are triangles, those of other nodes are nodes.
+  /// Lanes without a child are boxes that nothing overlaps. The children of a leaf are triangles, those of other nodes
+  /// are nodes.
   struct alignas(32) Node {
     std::array<Row, 3> lower;
     std::array<Row, 3> upper;
     std::array<int, lanes> child;
-    int leaf = -1;     ///< into leaves, or -1
-    int children = 0;  ///< in the first lanes
+    int leaf = -1;               ///< into leaves, or -1
+    int children = 0;            ///< in the first lanes
     unsigned leaf_children = 0;  ///< which of them are leaves, a bit each: saves a look at them
   };
 
@@ -92,15 +93,24 @@ struct alignas(64) NearTriangles {
 /// is one of these that neither of its ends has: both are then outside the same side of the box, or on the same side
 /// of the plane.
 struct PointCodes {
-  enum Kind : std::size_t { x_below_upper, x_above_lower, y_below_upper, y_above_lower, z_below_upper, z_above_lower,
-                            not_in_front, not_behind, kinds };
+  enum Kind : std::size_t {
+    x_below_upper,
+    x_above_lower,
+    y_below_upper,
+    y_above_lower,
+    z_below_upper,
+    z_above_lower,
+    not_in_front,
+    not_behind,
+    kinds
+  };
   std::array<std::array<unsigned char, 8>, kinds> bytes;
 };
 
 /// An edge and eight packed triangles.
 struct EdgeVisit {
-  int edge = 0;   ///< into NearEdges
-  int first = 0;  ///< into NearTriangles
+  int edge = 0;              ///< into NearEdges
+  int first = 0;             ///< into NearTriangles
   unsigned triangles = 0;    ///< that the edge may cross, a bit each
   unsigned within_rims = 0;  ///< of these: surely, as in EdgeTrianglePair
 };
@@ -110,8 +120,8 @@ struct WideTreeRoom {
   std::vector<int> stack;
   std::vector<int> leaves;  ///< nodes that are leaves
   NearTriangles near;
-  std::vector<PointCodes> codes;           ///< one a point
-  std::vector<std::uint64_t> candidates;   ///< per edge: the packed triangles that its ends do not rule out
+  std::vector<PointCodes> codes;          ///< one a point
+  std::vector<std::uint64_t> candidates;  ///< per edge: the packed triangles that its ends do not rule out
   std::vector<EdgeVisit> visits;
 };
 
