@@ -6,7 +6,7 @@ namespace tissue_sim {
 /// of the C library give other last bits from one version to the next, and on one machine: glibc computes sine, arc
 /// cosine and others with fused multiply-adds where the processor has them, and std::pow(x, 2) is a product at -O2 and
 /// a call at -O0. What a step reads comes from these instead. They are computed with twice the digits of a double and
-/// rounded once, so they are the nearest double but in one of some 10^5 cases. NaN where an argument is NaN or
+/// rounded once, so they are the nearest double but in one of some 4,000 cases. NaN where an argument is NaN or
 /// infinite.
 
 /// Of an angle in rad. Beyond 1e5 rad the angle is first reduced by the double nearest to 2 pi.
