@@ -113,7 +113,7 @@ bool healthy_in_turn(const OrganModel& model, const OrganState& state, std::uint
   }
   for (const LevelState& level : state.levels) {
     if (!numbers(level.positions, 0) || !numbers(level.velocities, 0)) return false;
-    if (!numbers(level.forces, 0) || !numbers(level.push, 0)) return false;
+    if (!numbers(level.push, 0)) return false;
   }
   return numbers(state.positions, first) && numbers(state.velocities, first) && numbers(state.forces, first) &&
          numbers(state.depths, 0);
@@ -125,7 +125,6 @@ void recover(const OrganModel& model, const OrganState& last_good, OrganState& s
     LevelState& at = state.levels[level];
     lay_down(model.levels[level].shape, at);
     std::fill(at.push.begin(), at.push.end(), Vector3::Zero());
-    std::fill(at.forces.begin(), at.forces.end(), Vector3::Zero());
   }
   copy_state(model, last_good, state);
   std::fill(state.forces.begin(), state.forces.end(), Vector3::Zero());

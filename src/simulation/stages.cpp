@@ -229,9 +229,9 @@ void make_room(Detection& detection, Penetration& penetration) {
         &detection.tree_room.stack, &detection.tree_room.leaves, &penetration.layer, &penetration.next_layer}) {
     list->reserve(usual_contacts);
   }
-  detection.tree_room.near.reserve(usual_contacts);
-  detection.tree_room.edges.resize(usual_contacts);
-  detection.tree_room.visits.resize(usual_contacts);
+  detection.tree_room.codes.reserve(usual_contacts);
+  detection.tree_room.candidates.reserve(usual_contacts);
+  detection.tree_room.visits.reserve(usual_contacts);
 }
 
 }  // namespace

@@ -59,7 +59,6 @@ std::vector<Field> fields_of(const OrganModel& model, OrganState& state) {
   for (LevelState& level : state.levels) {
     fields.push_back(of_vectors("level positions", level.positions));
     fields.push_back(of_vectors("level velocities", level.velocities));
-    fields.push_back(of_vectors("level forces", level.forces));
     fields.push_back(of_vectors("level push", level.push));
     fields.push_back({"level times", {&level.ahead, &level.speed}});
   }
