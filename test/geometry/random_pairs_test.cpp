@@ -85,7 +85,8 @@ Pairs hits_by_tree(const TriangleMesh& organ, const std::vector<Edge>& edges, co
   for (std::size_t e = 0; e < all.size(); ++e) all[e] = static_cast<int>(e);
   WideTreeRoom room;
   std::vector<EdgeTrianglePair> near;
-  find_crossing_pairs(tree, rounded, edges, all.data(), all.size(), room, near, registers);
+  const NearEdges given = {rounded.data(), rounded.size(), edges.data(), all.data(), all.size()};
+  find_crossing_pairs(tree, given, room, near, registers);
   Pairs pairs;
   for (const EdgeTrianglePair& pair : near) {
     const auto triangle = static_cast<std::size_t>(pair.triangle);
