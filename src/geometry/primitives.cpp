@@ -20,8 +20,7 @@ TriangleMesh make_sphere(double radius, int n) {
   mesh.vertices.emplace_back(0.0, 0.0, radius);
   for (int stack = 1; stack < n; ++stack) {
     const double polar = pi * stack / n;
-    for (int i = 0; i < n; ++i)
-      mesh.vertices.push_back(on_circle(i, n, radius * sine(polar), radius * cosine(polar)));
+    for (int i = 0; i < n; ++i) mesh.vertices.push_back(on_circle(i, n, radius * sine(polar), radius * cosine(polar)));
   }
   mesh.vertices.emplace_back(0.0, 0.0, -radius);
 
