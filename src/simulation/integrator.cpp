@@ -42,8 +42,7 @@ constexpr int chunks_of_many = 8;
 
 /// What tetrahedra read of the vertices. They are damped by evaluating them where the vertices will be after
 /// damping_time.
-template <class Vertices>
-void read_for_tetrahedra(const RestShape& rest, const Moving& moving, const Vertices& vertices, ElementRoom& room) {
+void read_for_tetrahedra(const RestShape& rest, const Moving& moving, const EveryVertex& vertices, ElementRoom& room) {
   const auto moved = [&](std::size_t v) -> Vector3 {
     return moving.positions[v] - rest.positions[v] + rest.damping_time * moving.velocities[v];
   };
@@ -56,8 +55,7 @@ void read_for_tetrahedra(const RestShape& rest, const Moving& moving, const Vert
   }
 }
 
-template <class Vertices>
-void write_of_tetrahedra(const Vertices& vertices, const ElementRoom& room, std::vector<Vector3>& forces) {
+void write_of_tetrahedra(const EveryVertex& vertices, const ElementRoom& room, std::vector<Vector3>& forces) {
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     const std::size_t v = vertices[i];
     forces[v] = room.forces[v].head<3>().cast<double>();

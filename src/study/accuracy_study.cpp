@@ -1,7 +1,5 @@
 #include "tissue_sim/study/accuracy_study.h"
 
-#include <time.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -12,6 +10,7 @@
 
 #include "tissue_sim/geometry/embedding.h"
 #include "tissue_sim/simulation/step.h"
+#include "tissue_sim/study/measuring.h"
 #include "tissue_sim/study/reference.h"
 
 namespace tissue_sim {
@@ -38,13 +37,6 @@ constexpr std::int64_t timed_batch = 20 * millisecond;      // ns
 constexpr int timed_batches = 3;                            // of which the median counts
 constexpr int timed_rounds = 3;                             // of which the least counts
 constexpr std::int64_t recording_batch = 50 * millisecond;  // ns
-
-/// Of this thread: what else the machine does is no part of it.
-double processor_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 double median(std::vector<double> values) {
   if (values.empty()) return 0.0;

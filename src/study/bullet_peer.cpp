@@ -5,6 +5,8 @@
 #include <BulletSoftBody/btSoftBodyRigidBodyCollisionConfiguration.h>
 #include <BulletSoftBody/btSoftRigidDynamicsWorld.h>
 #include <btBulletDynamicsCommon.h>
+
+#include "tissue_sim/study/measuring.h"
 #endif
 
 namespace tissue_sim {

@@ -1,5 +1,3 @@
-#include <time.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -14,6 +12,7 @@
 #include "tissue_sim/simulation/levels.h"
 #include "tissue_sim/simulation/step.h"
 #include "tissue_sim/study/bench.h"
+#include "tissue_sim/study/measuring.h"
 #include "tissue_sim/study/refinement.h"
 
 namespace tissue_sim {
@@ -95,12 +94,6 @@ Case liver_under_probe(const std::string& config, const std::string& mesh) {
   return made;
 }
 
-double thread_milliseconds() {
-  timespec now;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
-}
-
 /// One of the two ways to simulate the case, step by step.
 struct Way {
   World world;
@@ -118,9 +111,9 @@ struct Way {
   void go(const Pose& from, const Pose& to) {
     const Motion motion = {duration, {{true, from, to}}};
     ++report.step;
-    const double start = thread_milliseconds();
+    const double start = processor_seconds();
     step(world, motion, state, workspace, report);
-    milliseconds.push_back(thread_milliseconds() - start);
+    milliseconds.push_back(1e3 * (processor_seconds() - start));
     forces.push_back(report.wrenches.front().force.norm());
     recoveries += report.recovered ? 1 : 0;
     add(report.profile, 1.0, sum);
@@ -136,11 +129,6 @@ struct Way {
     return moved;
   }
 };
-
-double percentile(std::vector<double> values, double fraction) {
-  std::sort(values.begin(), values.end());
-  return values[std::min(values.size() - 1, static_cast<std::size_t>(fraction * static_cast<double>(values.size())))];
-}
 
 double largest_jump(const std::vector<double>& forces) {
   double largest = 0.0;

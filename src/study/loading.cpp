@@ -14,6 +14,7 @@
 #include "tissue_sim/scene/scene_file.h"
 #include "tissue_sim/simulation/step.h"
 #include "tissue_sim/simulation/timeline.h"
+#include "tissue_sim/study/measuring.h"
 #include "tissue_sim/study/temporary_folder.h"
 
 namespace tissue_sim {
@@ -45,15 +46,6 @@ auto timed(double& seconds, Work work) {
 void forget_most_resident() {
   malloc_trim(0);
   std::ofstream("/proc/self/clear_refs") << "5";
-}
-
-double most_resident() {
-  std::ifstream status("/proc/self/status");
-  std::string line;
-  while (std::getline(status, line)) {
-    if (line.rfind("VmHWM:", 0) == 0) return 1024.0 * std::stod(line.substr(6));
-  }
-  return 0.0;
 }
 
 void append(const void* data, std::size_t size, std::string& bytes) {
@@ -170,7 +162,7 @@ void write_stl(const TriangleMesh& mesh, const std::string& path) {
 }
 
 std::vector<LoadCost> time_loading(int triangles) {
-  const TemporaryFolder folder("tissue_sim_load");
+  const TemporaryFolder folder;
   write_probe(folder.path);
   {
     const int n = std::max(1, static_cast<int>(std::lround(std::sqrt(triangles / 20.0))));

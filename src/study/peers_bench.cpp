@@ -1,11 +1,11 @@
 #include <algorithm>
 #include <cstdio>
-#include <ctime>
 #include <iterator>
 #include <numeric>
 
 #include "tissue_sim/simulation/step.h"
 #include "tissue_sim/study/bench.h"
+#include "tissue_sim/study/measuring.h"
 #include "tissue_sim/study/peers.h"
 
 namespace tissue_sim {
@@ -209,12 +209,6 @@ void bench_fcl(int runs, JsonRows& json) {
 }
 
 }  // namespace
-
-double processor_seconds() {
-  timespec now = {};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 bool bench_peers(BenchWords words, JsonRows& json) {
   int runs = 3;

@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
-#include <fstream>
 #include <sstream>
 
 #include "tissue_sim/simulation/timeline.h"
 #include "tissue_sim/study/bench.h"
 #include "tissue_sim/study/growing_organ.h"
+#include "tissue_sim/study/measuring.h"
 
 namespace tissue_sim {
 
@@ -38,21 +38,6 @@ struct ScaleFigures {
   double load_seconds = 0.0;     ///< of everything that is built once
   double memory = 0.0;           ///< MB, the most that was resident
 };
-
-double percentile(std::vector<double> values, double fraction) {
-  if (values.empty()) return 0.0;
-  std::sort(values.begin(), values.end());
-  return values[std::min(values.size() - 1, static_cast<std::size_t>(fraction * static_cast<double>(values.size())))];
-}
-
-/// MB, the most of this process that was ever in memory.
-double peak_memory() {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);) {
-    if (line.rfind("VmHWM:", 0) == 0) return std::strtod(line.c_str() + 6, nullptr) / 1024.0;
-  }
-  return 0.0;
-}
 
 ScaleFigures run_press(int triangles, bool levels) {
   ScaleFigures figures;
@@ -86,7 +71,7 @@ ScaleFigures run_press(int triangles, bool levels) {
   figures.milliseconds_99 = percentile(total, 0.99);
   figures.ms_detection = percentile(detection, 0.5);
   figures.ms_deformation = percentile(deformation, 0.5);
-  figures.memory = peak_memory();
+  figures.memory = most_resident() / (1024.0 * 1024.0);
   return figures;
 }
 

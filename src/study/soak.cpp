@@ -1,6 +1,5 @@
 #include "tissue_sim/study/soak.h"
 
-#include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -12,6 +11,7 @@
 #include "tissue_sim/geometry/primitives.h"
 #include "tissue_sim/simulation/timeline.h"
 #include "tissue_sim/study/json_rows.h"
+#include "tissue_sim/study/measuring.h"
 
 namespace tissue_sim {
 
@@ -27,26 +27,12 @@ constexpr double most_growth = 1e6;                   // bytes
 constexpr double most_slowing = 1.1;
 constexpr std::int64_t step_nanoseconds = 1'000'000;
 
-/// Of this thread: what other programs take of the processor does not count.
-double processor_seconds() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
-
 double resident_bytes() {
   std::ifstream statm("/proc/self/statm");
   double pages = 0.0;
   double resident = 0.0;
   statm >> pages >> resident;
   return resident * static_cast<double>(sysconf(_SC_PAGESIZE));
-}
-
-double percentile(std::vector<double>& values, double fraction) {
-  if (values.empty()) return 0.0;
-  const auto at = static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + at, values.end());
-  return values[static_cast<std::size_t>(at)];
 }
 
 /// From 0 to 1 where x does, without a jerk; 0 before and 1 after.

@@ -1,47 +1,15 @@
-#include <atomic>
 #include <cstdio>
-#include <cstdlib>
-#include <new>
 
+#include "benchmark/counted_allocations.h"
 #include "tissue_sim/study/bench.h"
 #include "tissue_sim/study/soak.h"
-
-namespace {
-std::atomic<std::size_t> allocations{0};
-
-void* counted(std::size_t size) {
-  allocations.fetch_add(1, std::memory_order_relaxed);
-  if (void* memory = std::malloc(size > 0 ? size : 1)) return memory;
-  throw std::bad_alloc();
-}
-}  // namespace
-
-// Of the whole program: the standard library's are replaced.
-void* operator new(std::size_t size) {
-  return counted(size);
-}
-void* operator new[](std::size_t size) {
-  return counted(size);
-}
-void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-void operator delete[](void* memory) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
-void operator delete[](void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
 
 namespace tissue_sim {
 
 bool bench_soak(BenchWords words, JsonRows& json) {
   int thousands = 3600;
   if (!words.take_number("--thousands", 20, 1'000'000, thousands) || !words.words.empty()) return false;
-  const SoakFigures f = run_soak(1000LL * thousands, [] { return allocations.load(std::memory_order_relaxed); });
+  const SoakFigures f = run_soak(1000LL * thousands, counted_allocations);
   const auto whole = [](std::int64_t number) { return static_cast<long long>(number); };
   std::printf("A probe presses, slides, turns, leaves and comes again\n\n");
   std::printf("steps                     %lld, %lld of them in contact, %lld touches\n", whole(f.steps),

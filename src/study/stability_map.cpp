@@ -60,7 +60,7 @@ void write_msh(const TetrahedralMesh& solid, const std::string& path) {
 /// The organs, in edges, and scene files of them.
 class Scenes {
  public:
-  Scenes() : folder_("tissue_sim_stability") {
+  Scenes() {
     for (const bool with_levels : {false, true}) {
       const int times = with_levels ? fine : 1;
       const std::string number = std::to_string(times);

@@ -6,9 +6,9 @@
 #include <iterator>
 #include <sstream>
 
-#include "scene/temporary_folder.h"
 #include "tissue_sim/scene/instrument_file.h"
 #include "tissue_sim/scene/scene_file.h"
+#include "tissue_sim/study/temporary_folder.h"
 
 namespace tissue_sim {
 namespace {

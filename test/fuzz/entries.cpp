@@ -2,7 +2,6 @@
 
 #include <stdexcept>
 
-#include "scene/temporary_folder.h"
 #include "tissue_sim/contact/instrument_surface.h"
 #include "tissue_sim/geometry/primitives.h"
 #include "tissue_sim/scene/instrument_file.h"
@@ -10,6 +9,7 @@
 #include "tissue_sim/scene/scene_file.h"
 #include "tissue_sim/scene/tetrahedral_mesh_file.h"
 #include "tissue_sim/simulation/timeline.h"
+#include "tissue_sim/study/temporary_folder.h"
 
 namespace tissue_sim {
 namespace {

@@ -7,33 +7,21 @@
 #include <stdexcept>
 
 #include "entries.h"
-#include "scene/temporary_folder.h"
-#include "tissue_sim/geometry/primitives.h"
+#include "ros/ball_scene.h"
 #include "tissue_sim/replay/replay.h"
 #include "tissue_sim/ros/frames.h"
 #include "tissue_sim/ros/messages.h"
+#include "tissue_sim/study/temporary_folder.h"
 
 namespace tissue_sim {
 namespace {
 
 constexpr double bound = 10.0;  ///< m: the organ is 6 cm across, at the origin
 
-/// An organ that only feels contact, and long steps: the time goes into what is read.
-Scene ball_scene() {
-  Organ ball;
-  ball.name = "ball";
-  ball.mesh = make_sphere(0.03, 8);
-  ball.model = Model::contact_only;
-  Instrument probe;
-  probe.name = "probe";
-  probe.tip_link = "tip";
-  probe.pose_topic = "test/measured_cp";
-  probe.parts.push_back({"tip", make_sphere(0.005, 4), true});
-  Scene scene;
-  scene.frame = "world";
+/// Long steps: the time goes into what is read.
+Scene slow_scene() {
+  Scene scene = ball_scene(8, 4);
   scene.time_step = 0.1;
-  scene.organs.push_back(ball);
-  scene.instruments.push_back(probe);
   return scene;
 }
 
@@ -91,7 +79,7 @@ void require_sound_output(const Scene& scene, const Timeline& timeline, FrameHis
 
 std::string enter_bag(const std::string& bytes) {
   static const TemporaryFolder folder;
-  static const Scene scene = ball_scene();
+  static const Scene scene = slow_scene();
   ReplayOptions options;
   options.input = folder.write("in.bag", bytes);
   options.output = (folder.path / "out.bag").string();
@@ -109,7 +97,7 @@ std::string enter_bag(const std::string& bytes) {
 }
 
 std::string enter_messages(const std::string& bytes) {
-  static const Scene scene = ball_scene();
+  static const Scene scene = slow_scene();
   Timeline timeline(scene);
   tf2::BufferCore transforms;
   FrameHistory frames;

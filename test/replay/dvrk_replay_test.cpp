@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +10,7 @@
 #include "tissue_sim/replay/replay.h"
 #include "tissue_sim/ros/message_types.h"
 #include "tissue_sim/scene/scene_file.h"
+#include "tissue_sim/study/temporary_folder.h"
 
 namespace tissue_sim {
 namespace {
@@ -22,11 +22,10 @@ TEST(DvrkReplay, PressesTheStomachAndLetsItComeBack) {
   if (!std::ifstream(bag).good()) GTEST_SKIP() << "no ../shared/data beside the repository";
   std::vector<std::string> warnings;
   const Scene scene = load_scene(TISSUE_SIM_SOURCE_DIR "/test/scenes/dvrk_stomach.yaml", warnings);
-  char folder[] = "/tmp/tissue_sim_dvrk_XXXXXX";
-  ASSERT_NE(mkdtemp(folder), nullptr);
+  const TemporaryFolder folder;
   ReplayOptions options;
   options.input = bag;
-  options.output = std::string(folder) + "/out.bag";
+  options.output = (folder.path / "out.bag").string();
   const ReplaySummary summary = replay(scene, options);
 
   EXPECT_EQ(summary.poses_used, 3420u);
@@ -57,8 +56,6 @@ TEST(DvrkReplay, PressesTheStomachAndLetsItComeBack) {
     break;
   }
   out.close();
-  unlink(options.output.c_str());
-  rmdir(folder);
   ASSERT_GE(farthest, 0.0) << "no state later than one second after the last contact";
   EXPECT_LT(farthest, 0.01 * size);
   RecordProperty("farthest_um", static_cast<int>(1e6 * farthest));

@@ -4,11 +4,11 @@
 #include <set>
 #include <sstream>
 
-#include "../scene/temporary_folder.h"
 #include "tissue_sim/replay/replay.h"
 #include "tissue_sim/ros/messages.h"
 #include "tissue_sim/scene/scene_file.h"
 #include "tissue_sim/simulation/accuracy.h"
+#include "tissue_sim/study/temporary_folder.h"
 
 namespace tissue_sim {
 namespace {

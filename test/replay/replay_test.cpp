@@ -5,34 +5,17 @@
 #include <gtest/gtest.h>
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
-#include <unistd.h>
 
 #include <cstdlib>
 #include <fstream>
 #include <set>
 
-#include "tissue_sim/geometry/primitives.h"
+#include "ros/ball_scene.h"
 #include "tissue_sim/ros/messages.h"
+#include "tissue_sim/study/temporary_folder.h"
 
 namespace tissue_sim {
 namespace {
-
-Scene ball_scene() {
-  Organ ball;
-  ball.name = "ball";
-  ball.mesh = make_sphere(0.03, 12);
-  ball.model = Model::contact_only;
-  Instrument probe;
-  probe.name = "probe";
-  probe.tip_link = "tip";
-  probe.pose_topic = "test/measured_cp";
-  probe.parts.push_back({"tip", make_sphere(0.005, 8), true});
-  Scene scene;
-  scene.frame = "world";
-  scene.organs.push_back(ball);
-  scene.instruments.push_back(probe);
-  return scene;
-}
 
 bool exists(const std::string& path) {
   return std::ifstream(path).good();
@@ -41,15 +24,8 @@ bool exists(const std::string& path) {
 class ReplayTest : public testing::Test {
  protected:
   void SetUp() override {
-    char pattern[] = "/tmp/tissue_sim_replay_XXXXXX";
-    ASSERT_NE(mkdtemp(pattern), nullptr);
-    folder = pattern;
-    options.input = folder + "/in.bag";
-    options.output = folder + "/out.bag";
-  }
-  void TearDown() override {
-    for (const char* name : {"/in.bag", "/out.bag", "/cut.bag", "/hashes.txt"}) unlink((folder + name).c_str());
-    rmdir(folder.c_str());
+    options.input = (folder.path / "in.bag").string();
+    options.output = (folder.path / "out.bag").string();
   }
 
   /// 50 poses in 0.5 s, from above the ball to 4 mm inside it.
@@ -71,20 +47,20 @@ class ReplayTest : public testing::Test {
   /// What replay() says; empty where it says nothing.
   std::string refusal() const {
     try {
-      replay(ball_scene(), options);
+      replay(ball_scene(12, 8), options);
     } catch (const std::runtime_error& error) {
       return error.what();
     }
     return "";
   }
 
-  std::string folder;
+  TemporaryFolder folder;
   ReplayOptions options;
 };
 
 TEST_F(ReplayTest, WritesWhatTheNodePublishes) {
   record("/test/measured_cp");  // with a slash, which the scene does not write
-  const ReplaySummary summary = replay(ball_scene(), options);
+  const ReplaySummary summary = replay(ball_scene(12, 8), options);
   EXPECT_EQ(summary.poses_used, 50U);
   EXPECT_EQ(summary.poses_dropped(), 0U);
   EXPECT_EQ(summary.rows.size(), 50U);
@@ -106,14 +82,14 @@ TEST_F(ReplayTest, WritesWhatTheNodePublishes) {
 
 TEST_F(ReplayTest, TwiceIsTheSame) {
   record("test/measured_cp");
-  const std::uint64_t first = replay(ball_scene(), options).hash;
-  EXPECT_EQ(replay(ball_scene(), options).hash, first);
+  const std::uint64_t first = replay(ball_scene(12, 8), options).hash;
+  EXPECT_EQ(replay(ball_scene(12, 8), options).hash, first);
 }
 
 TEST_F(ReplayTest, WritesAHashAStep) {
   record("test/measured_cp");
-  options.hashes = folder + "/hashes.txt";
-  const ReplaySummary summary = replay(ball_scene(), options);
+  options.hashes = (folder.path / "hashes.txt").string();
+  const ReplaySummary summary = replay(ball_scene(12, 8), options);
   std::ifstream file(options.hashes);
   std::uint64_t steps = 0;
   std::uint64_t step = 0;
@@ -128,14 +104,14 @@ TEST_F(ReplayTest, WritesAHashAStep) {
   EXPECT_EQ(steps, summary.steps);
   EXPECT_EQ(different.size(), steps) << "each is of all states so far";
   EXPECT_EQ(hash, hash_text(summary.hash));
-  options.hashes = folder + "/nowhere/hashes.txt";
+  options.hashes = (folder.path / "nowhere" / "hashes.txt").string();
   EXPECT_NE(refusal().find("nowhere/hashes.txt: cannot be written"), std::string::npos) << refusal();
 }
 
 TEST_F(ReplayTest, HoldGoesOnAfterTheLastPose) {
   record("test/measured_cp");
   options.hold = 0.25;
-  EXPECT_NEAR(replay(ball_scene(), options).sim_seconds, 0.74, 1e-9);
+  EXPECT_NEAR(replay(ball_scene(12, 8), options).sim_seconds, 0.74, 1e-9);
 }
 
 TEST_F(ReplayTest, MissingBag) {
@@ -154,10 +130,10 @@ TEST_F(ReplayTest, NotABag) {
 TEST_F(ReplayTest, UnindexedBagNamesTheCure) {
   {
     // The index is written when a bag is closed: a copy from before has none.
-    rosbag::Bag bag(folder + "/cut.bag", rosbag::bagmode::Write);
+    rosbag::Bag bag((folder.path / "cut.bag").string(), rosbag::bagmode::Write);
     bag.setChunkThreshold(1);
     record("test/measured_cp", bag);
-    std::ifstream source(folder + "/cut.bag", std::ios::binary);
+    std::ifstream source((folder.path / "cut.bag").string(), std::ios::binary);
     std::ofstream(options.input, std::ios::binary) << source.rdbuf();
   }
   EXPECT_NE(refusal().find("rosbag reindex"), std::string::npos) << refusal();
@@ -180,7 +156,7 @@ TEST_F(ReplayTest, TopicOfAnotherType) {
 
 TEST_F(ReplayTest, OutputThatCannotBeWritten) {
   record("test/measured_cp");
-  options.output = folder + "/nowhere/out.bag";
+  options.output = (folder.path / "nowhere" / "out.bag").string();
   EXPECT_NE(refusal().find("cannot be written"), std::string::npos) << refusal();
   options.output = options.input;
   EXPECT_NE(refusal().find("another name"), std::string::npos) << refusal();

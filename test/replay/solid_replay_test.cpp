@@ -3,9 +3,9 @@
 #include <cstdlib>
 #include <fstream>
 
-#include "../scene/temporary_folder.h"
 #include "tissue_sim/replay/replay.h"
 #include "tissue_sim/scene/scene_file.h"
+#include "tissue_sim/study/temporary_folder.h"
 
 namespace tissue_sim {
 namespace {

@@ -2,29 +2,12 @@
 
 #include <gtest/gtest.h>
 
-#include "tissue_sim/geometry/primitives.h"
+#include "ros/ball_scene.h"
 
 namespace tissue_sim {
 namespace {
 
 constexpr double half_root = 0.70710678118654752;
-
-Scene ball_scene() {
-  Organ ball;
-  ball.name = "ball";
-  ball.mesh = make_sphere(0.03, 8);
-  ball.model = Model::contact_only;
-  Instrument probe;
-  probe.name = "probe";
-  probe.tip_link = "tip";
-  probe.pose_topic = "test/measured_cp";
-  probe.parts.push_back({"tip", make_sphere(0.005, 6), true});
-  Scene scene;
-  scene.frame = "world";
-  scene.organs.push_back(ball);
-  scene.instruments.push_back(probe);
-  return scene;
-}
 
 TEST(Messages, HashIsSixteenDigits) {
   EXPECT_EQ(hash_text(0), "0000000000000000");
@@ -46,7 +29,7 @@ TEST(Messages, PoseIsTakenAsItIs) {
 }
 
 TEST(Messages, TopologyHoldsTheRestShape) {
-  Scene scene = ball_scene();
+  Scene scene = ball_scene(8, 6);
   const TissueTopology topology = topology_message(scene, 0);
   const TriangleMesh& mesh = scene.organs[0].mesh;
   ASSERT_EQ(topology.triangles.size(), 3 * mesh.triangles.size());
@@ -61,7 +44,7 @@ TEST(Messages, TopologyHoldsTheRestShape) {
 }
 
 TEST(Messages, ContactsAreNamed) {
-  const Scene scene = ball_scene();
+  const Scene scene = ball_scene(8, 6);
   StepReport report;
   report.step = 7;
   report.stamp = 2'000'000'001;
@@ -87,7 +70,7 @@ TEST(Messages, ContactsAreNamed) {
 }
 
 TEST(Messages, AMessageFilledAgainIsAsANewOne) {
-  const Scene scene = ball_scene();
+  const Scene scene = ball_scene(8, 6);
   Timeline timeline(scene);
   const auto press = [&](std::int64_t stamp, double depth) {
     timeline.add_pose(0, {stamp, {Vector3(0.0, 0.0, 0.035 - depth), Eigen::Quaterniond::Identity()}});
@@ -132,7 +115,7 @@ TEST(Messages, WrenchTurnsIntoThePosesFrame) {
 }
 
 TEST(Messages, MarkersBeforeTheFirstStep) {
-  const Scene scene = ball_scene();
+  const Scene scene = ball_scene(8, 6);
   const Timeline timeline(scene);
   const visualization_msgs::MarkerArray array = markers_message(scene, timeline);
   ASSERT_GE(array.markers.size(), 2U);

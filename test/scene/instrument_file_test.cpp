@@ -5,7 +5,7 @@
 #include <cmath>
 #include <map>
 
-#include "temporary_folder.h"
+#include "tissue_sim/study/temporary_folder.h"
 
 namespace tissue_sim {
 namespace {

@@ -7,9 +7,9 @@
 #include <limits>
 #include <sstream>
 
-#include "temporary_folder.h"
 #include "tissue_sim/geometry/primitives.h"
 #include "tissue_sim/scene/scene.h"
+#include "tissue_sim/study/temporary_folder.h"
 
 namespace tissue_sim {
 namespace {

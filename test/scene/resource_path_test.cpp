@@ -4,8 +4,8 @@
 
 #include <cstdlib>
 
-#include "temporary_folder.h"
 #include "tissue_sim/scene/scene.h"
+#include "tissue_sim/study/temporary_folder.h"
 
 namespace tissue_sim {
 namespace {

@@ -9,8 +9,8 @@
 #include <set>
 #include <sstream>
 
-#include "temporary_folder.h"
 #include "tissue_sim/scene/scene.h"
+#include "tissue_sim/study/temporary_folder.h"
 
 namespace tissue_sim {
 namespace {

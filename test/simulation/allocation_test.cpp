@@ -1,39 +1,7 @@
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <cstdlib>
-#include <new>
-
+#include "benchmark/counted_allocations.h"
 #include "simulation/solid_scenes.h"
-
-namespace {
-std::atomic<std::size_t> allocations{0};
-
-void* counted(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size > 0 ? size : 1)) return memory;
-  throw std::bad_alloc();
-}
-}  // namespace
-
-void* operator new(std::size_t size) {
-  return counted(size);
-}
-void* operator new[](std::size_t size) {
-  return counted(size);
-}
-void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-void operator delete[](void* memory) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
-void operator delete[](void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
 
 namespace tissue_sim {
 namespace {
@@ -56,7 +24,7 @@ std::size_t allocations_once_warm(const Organ& organ, bool in_parts) {
 
   Motion motion = away;
   int contacts = 0;
-  const std::size_t before = allocations;
+  const std::size_t before = counted_allocations();
   for (int i = 1; i <= 200; ++i) {
     motion.instruments[0].from = motion.instruments[0].to;
     motion.instruments[0].to.position.x() = 0.062 - 0.020 * std::min(i, 200 - i) / 100.0;
@@ -64,7 +32,7 @@ std::size_t allocations_once_warm(const Organ& organ, bool in_parts) {
     step(simulation.world, motion, simulation.state, simulation.workspace, simulation.report);
     contacts += static_cast<int>(simulation.report.contacts.size());
   }
-  const std::size_t after = allocations;
+  const std::size_t after = counted_allocations();
   EXPECT_GT(contacts, 50);
   return after - before;
 }
@@ -102,9 +70,9 @@ std::size_t allocations_of_a_solid(Organ organ, double top, double radius, int t
   down_and_up();
   down_and_up();
   contacts = 0;
-  const std::size_t before = allocations;
+  const std::size_t before = counted_allocations();
   down_and_up();
-  const std::size_t after = allocations;
+  const std::size_t after = counted_allocations();
   EXPECT_GT(contacts, 50);
   return after - before;
 }

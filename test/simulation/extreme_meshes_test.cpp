@@ -3,11 +3,11 @@
 #include <cstdlib>
 #include <sstream>
 
-#include "scene/temporary_folder.h"
 #include "simulation/test_scenes.h"
 #include "tissue_sim/scene/mesh_file.h"
 #include "tissue_sim/scene/tetrahedral_mesh_file.h"
 #include "tissue_sim/simulation/timeline.h"
+#include "tissue_sim/study/temporary_folder.h"
 
 namespace tissue_sim {
 namespace {

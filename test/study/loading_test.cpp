@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "scene/temporary_folder.h"
 #include "tissue_sim/scene/mesh_file.h"
+#include "tissue_sim/study/temporary_folder.h"
 
 namespace tissue_sim {
 namespace {

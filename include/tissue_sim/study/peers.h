@@ -12,9 +12,6 @@ namespace tissue_sim {
 /// What a user would pick instead, from the distribution's packages, run on the same meshes along the same path. Where
 /// a package was absent when the benchmark was built its functions answer with nothing.
 
-/// s, of the processor, all threads together: what else the machine does takes no part in it.
-double processor_seconds();
-
 struct PeerStep {
   double seconds = 0.0;
   int contacts = 0;
