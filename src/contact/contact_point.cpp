@@ -15,6 +15,9 @@ constexpr double longest_push = 0.5;
 /// Of the same: the motion after which a vertex that was no poke is looked at again.
 constexpr double recheck = 0.05;
 
+/// m; how far around an instrument the organ's patches are gathered: most of what is looked at touches.
+constexpr double near_reach = 0.5e-3;
+
 /// m; how far inside the instrument an edge is left.
 constexpr double edge_slop = 0.5 * contact_margin;
 
@@ -191,6 +194,7 @@ void add_edge_contacts(const OrganSurface& organ, const InstrumentSurface& instr
 void add_poke_contacts(const OrganSurface& organ, const InstrumentSurface& instrument, int piece, const Pose& pose,
                        const std::vector<int>& vertices, Clearance& clearance, std::vector<ContactPoint>& points) {
   const std::size_t first = points.size();
+  gather_near(organ, TurnedBox(instrument.bounds.grown(near_reach), pose));
   for (const int u : vertices) {
     const bool poked_before = clearance.pokes[u] != 0;
     clearance.pokes[u] = 0;

@@ -58,7 +58,7 @@ void gather_pairs(const OrganSurface& organ, const InstrumentSurface& instrument
   const FlatLists& vertices = organ.patches.edge_vertices;
   const FlatLists& edges = organ.patches.edges;
   const Eigen::Quaterniond back = pose.orientation.conjugate();
-  for_each_patch_near(organ, scene_bounds(instrument.bounds, pose), [&](int patch) {
+  for_each_patch_near(organ, TurnedBox(instrument.bounds, pose), [&](int patch) {
     const Box& box = organ.patches.nodes[organ.patches.leaf_of[patch]].box;
     const Vector3 middle = back * (0.5 * (box.lower + box.upper) - pose.position);
     if (is_clear(instrument, middle, 0.5 * box.size().norm() + clear_margin, d.free_balls[patch])) return;
@@ -216,7 +216,7 @@ void flood(const OrganSurface& organ, const InstrumentSurface& instrument, const
 
   d.colliding.clear();
   d.stack.clear();
-  for_each_patch_near(organ, scene_bounds(instrument.bounds, pose), [&](int patch) {
+  for_each_patch_near(organ, TurnedBox(instrument.bounds, pose), [&](int patch) {
     const FlatLists& vertices = organ.patches.vertices;
     for (const int* v = vertices.begin(patch); v != vertices.end(patch); ++v) d.vertex_set.add(*v);
   });

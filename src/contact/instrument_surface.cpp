@@ -88,12 +88,6 @@ std::vector<int> sharper_than(const InstrumentSurface& surface, double radius) {
   return vertices;
 }
 
-Box scene_bounds(const Box& box, const Pose& pose) {
-  const Vector3 centre = pose.apply(0.5 * (box.lower + box.upper));
-  const Vector3 half = pose.orientation.toRotationMatrix().cwiseAbs() * (0.5 * box.size());
-  return {centre - half, centre + half};
-}
-
 ClosestFeature closest_feature(const InstrumentSurface& surface, const Vector3& p, double reach, int guess) {
   const ClosestOnMesh closest = closest_on_mesh(surface.vertices, surface.triangles, surface.tree, p, reach, guess);
   if (closest.triangle < 0) return {p, Vector3::UnitZ(), -std::numeric_limits<double>::max(), -1};

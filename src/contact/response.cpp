@@ -86,17 +86,17 @@ void stop(std::vector<ContactPoint>& points, const std::vector<double>& inverse_
     }
   };
   for (ContactPoint& point : points) {
-    if (!(mobility(point, inverse_mass).ease > 0.0)) point.*given = 0.0;
+    point.ease = mobility(point, inverse_mass).ease;
+    if (!(point.ease > 0.0)) point.*given = 0.0;
     push(point, point.*given);
   }
   for (int round = 0; round < rounds_of_stop; ++round) {
     double largest_change = 0.0;
     double largest = 0.0;
     for (ContactPoint& point : points) {
-      const double ease = mobility(point, inverse_mass).ease;
-      if (!(ease > 0.0)) continue;
+      if (!(point.ease > 0.0)) continue;
       const double approach = point.direction.dot(instrument(point) - at_point(point, velocities));
-      const double impulse = std::max(0.0, point.*given + approach / ease);
+      const double impulse = std::max(0.0, point.*given + approach / point.ease);
       const double change = impulse - point.*given;
       push(point, change);
       point.*given = impulse;

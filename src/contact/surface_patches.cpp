@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <numeric>
 
 namespace tissue_sim {
@@ -12,6 +13,9 @@ namespace {
 typedef double Two __attribute__((vector_size(16), aligned(8), may_alias));  // NOLINT(modernize-use-using)
 
 constexpr double never = -1e300;  ///< m; the box of what was fitted then is everywhere
+
+/// Patches gathered for a search: of more than these the tree finds the nearest sooner.
+constexpr std::size_t most_near = 64;
 
 struct Builder {
   const std::vector<Vector3>& middles;  ///< of the triangles
@@ -129,6 +133,7 @@ SurfacePatches build_patches(const std::vector<Vector3>& positions, const std::v
 
 void forget(SurfacePatches& patches) {
   patches.travel = 0.0;  // it need not be a number any more
+  patches.near_at = never;
   for (SurfacePatches::Node& node : patches.nodes) {
     node.box = {Vector3::Zero(), Vector3::Zero()};
     node.fitted_at = never;
@@ -170,12 +175,31 @@ void place_around(const OrganSurface& organ, int triangle) {
   }
 }
 
+void gather_near(const OrganSurface& organ, const TurnedBox& box) {
+  SurfacePatches& patches = organ.patches;
+  patches.near.clear();
+  for_each_patch_near(organ, box, [&](int patch) { patches.near.push_back(patches.leaf_of[patch]); });
+  patches.near_box = box;
+  patches.near_at = patches.travel;
+}
+
 ClosestOnMesh closest_on_organ(const OrganSurface& organ, const Vector3& p, double reach, int guess) {
   SurfacePatches& patches = organ.patches;
   ClosestSearch search(organ.positions, organ.triangles, p, reach);
   if (guess >= 0) {
     for (const int vertex : organ.triangles[guess]) place_vertex(organ, vertex);
     search.look_at(guess);
+  }
+  const auto look_through = [&](const SurfacePatches::Node& leaf) {
+    if (search.too_far(leaf.box.squared_distance(p))) return;
+    for (const int* t = patches.triangles.begin(leaf.patch); t != patches.triangles.end(leaf.patch); ++t) {
+      search.look_at_if_near(*t);
+    }
+  };
+  if (patches.near_at == patches.travel && patches.near.size() <= most_near &&
+      patches.near_box.contains(p, std::sqrt(search.bound))) {
+    for (const int leaf : patches.near) look_through(patches.nodes[leaf]);
+    return search.best;
   }
   const auto distance_to = [&](const SurfacePatches::Node& node) {
     return node.box.grown(patches.travel - node.fitted_at).squared_distance(p);
@@ -200,10 +224,7 @@ ClosestOnMesh closest_on_organ(const OrganSurface& organ, const Vector3& p, doub
       continue;
     }
     fit_patch(organ, node);
-    if (search.too_far(distance_to(node))) continue;
-    for (const int* t = patches.triangles.begin(node.patch); t != patches.triangles.end(node.patch); ++t) {
-      search.look_at_if_near(*t);
-    }
+    look_through(node);
   }
   return search.best;
 }

@@ -9,7 +9,7 @@ namespace {
 
 /// Edges: how far inside the radius the coarser level begins to take over. Without it the force jumps when the region
 /// moves.
-constexpr double band_edges = 2.5;
+constexpr double band_edges = 1.5;
 
 /// What the batches of constraints multiply their vertices by.
 constexpr int floats_of_vertex = 8;

@@ -1,12 +1,17 @@
 #include "tissue_sim/simulation/awake_solid.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace tissue_sim {
 
 namespace {
 
 constexpr std::size_t lanes = NeoHookeanBatch::lanes;
+
+/// Of critical, of a band's spring. Undamped, a wave that the coarser level does not share was thrown back into the
+/// region: with a radius of five edges the force on a sliding probe swung by a third.
+constexpr double band_damping = 0.7;
 
 /// Of what a region needs when it is first gathered: it grows while an instrument goes in.
 constexpr std::size_t spare = 2;
@@ -114,7 +119,9 @@ void gather(const RegionModel& model, const RestShape& shape, const Embedding& p
     if (!(reach > 0.0)) continue;
     BandVertex& band = awake.band.emplace_back();
     band.vertex = place;
+    band.mass = shape.mass[v];
     band.stiffness = stiffness * reach * reach / (1.01 - std::min(reach, 1.0));
+    band.damping = 2.0 * band_damping * std::sqrt(band.stiffness * band.mass);
   }
   for (const int b : room.batches) {
     const NeoHookeanBatch& batch = shape.packed.batches[b];
@@ -209,9 +216,10 @@ void solid_forces(const RestShape& shape, double dt, AwakeSolid& awake) {
     add_neo_hookean_forces(awake.packed, awake.damped.front().data(), awake.forces.front().data());
   }
   for (const BandVertex& band : awake.band) {
-    const double stable = 0.25 * shape.mass[awake.vertices[band.vertex]] / (dt * dt);
-    const auto stiffness = static_cast<float>(std::min(band.stiffness, stable));
-    awake.forces[band.vertex] += stiffness * (band.target - awake.displacements[band.vertex]);
+    const auto stiffness = static_cast<float>(std::min(band.stiffness, 0.25 * band.mass / (dt * dt)));
+    const auto damping = static_cast<float>(std::min(band.damping, 0.5 * band.mass / dt));
+    awake.forces[band.vertex] += stiffness * (band.target - awake.displacements[band.vertex]) +
+                                 damping * (band.velocity - awake.velocities[band.vertex]);
   }
 }
 

@@ -246,9 +246,9 @@ double stiffening(const RestShape& rest, const FlatLists& tetrahedra_at, const s
       const int v = point.bearers.vertices[i];
       for (const int* t = tetrahedra_at.begin(v); t != tetrahedra_at.end(v); ++t) {
         const NeoHookeanElement& element = rest.tetrahedra[*t];
-        const NeoHookeanElement::Vectors x = gather(element, positions);
+        const std::array<double, 4> stiffnesses = element.stiffnesses(gather(element, positions));
         for (std::size_t corner = 0; corner < 4; ++corner) {
-          stiffest = std::max(stiffest, element.stiffness(x, corner) * rest.inverse_mass[element.vertices[corner]]);
+          stiffest = std::max(stiffest, stiffnesses[corner] * rest.inverse_mass[element.vertices[corner]]);
         }
       }
     }

@@ -13,13 +13,18 @@ void step_organ(StepContext& context) {
   const int substeps = count_substeps(context);
   for (int i = 1; i <= substeps && !context.ran_away; ++i) {
     place_instruments(context, i, substeps);  // poses at the end of the substep
-    refit(context);                           // the tree of the organ, where an instrument is near
-    find_crossings(context);                  // stage 1: crossings, border vertices, colliding vertices
-    find_border_depths(context);              // stage 2: Eq. 1-3, or exact for all
-    propagate_depths(context);                // stage 3: Eq. 4-6
-    respond(context);                         // colliding vertices, edges and poked triangles out of the instrument
-    deform(context);                          // elements: C, its gradient, k; integration; what is plastic stays
-    bear(context);                            // the instruments bear the forces of the tissue that they touch
+    if (looks_again(context)) {
+      refit(context);               // the tree of the organ, where an instrument is near
+      find_crossings(context);      // stage 1: crossings, border vertices, colliding vertices
+      find_border_depths(context);  // stage 2: Eq. 1-3, or exact for all
+      propagate_depths(context);    // stage 3: Eq. 4-6
+      find_contacts(context);       // colliding vertices, edges and poked triangles: planes to keep out of
+    } else {
+      follow_instruments(context);  // the contacts of the substep before, with the instruments
+    }
+    respond(context);  // contacts out of the instrument
+    deform(context);   // elements: C, its gradient, k; integration; what is plastic stays
+    bear(context);     // the instruments bear the forces of the tissue that they touch
   }
   check_health(context);
   report_contacts(context);

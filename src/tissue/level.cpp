@@ -12,7 +12,7 @@ namespace tissue_sim {
 namespace {
 
 /// Of the organ's moduli: linear tetrahedra of a coarse lattice are too stiff by about this.
-constexpr double coarse_modulus = 0.9;
+constexpr double coarse_modulus = 0.87;
 
 /// Cells of the coarser level: a smaller region would be all band, and its error is not known.
 constexpr double least_cells = 2.0;
@@ -149,7 +149,7 @@ Level build_level(const Organ& organ, const RestShape& finest, const RestShape& 
 RegionSize region_size(double tolerance) {
   // A radius of 3 cells of the coarser level, each twice the edge of the finer, made errors of 1 to 3 % in the force, 3
   // to 4 % near the contact and 10 to 12 % over a whole block bonded to the ground; 4 cells a third of that.
-  const double cells = std::max(least_cells, 3.0 + (0.05 - tolerance) / 0.03);
+  const double cells = std::max(least_cells, 2.5 + (0.05 - tolerance) / 0.03);
   return {2.0 * cells, cells};
 }
 

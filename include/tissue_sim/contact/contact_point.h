@@ -31,6 +31,7 @@ struct ContactPoint {
   double target = 0.0;                            ///< m, for the bearers: it shall get `lift` farther itself
   double lift = 0.0;                              ///< m, along direction, from where the bearers put it to where it is
   Vector3 instrument_velocity = Vector3::Zero();  ///< m/s, of the instrument at the point
+  double ease = 0.0;                              ///< 1/kg, how easily the point moves; set by the response
   double impulse = 0.0;                           ///< N s along direction, on the organ; set by the response
   double force = 0.0;                             ///< N along direction, on the organ; see bear_forces
   double stiffness = 0.0;                         ///< N/m, of the implicit integrator; see descend

@@ -5,6 +5,7 @@
 #include "tissue_sim/geometry/closest_point.h"
 #include "tissue_sim/geometry/pose.h"
 #include "tissue_sim/geometry/triangle_mesh.h"
+#include "tissue_sim/geometry/turned_box.h"
 #include "tissue_sim/geometry/wide_tree.h"
 
 namespace tissue_sim {
@@ -35,9 +36,6 @@ InstrumentSurface build_instrument_surface(const TriangleMesh& mesh, bool closed
 
 /// The vertices where the surface is curved more sharply than `radius` (m).
 std::vector<int> sharper_than(const InstrumentSurface& surface, double radius);
-
-/// The smallest box in the scene's frame that holds a box of the tip frame at `pose`.
-Box scene_bounds(const Box& box, const Pose& pose);
 
 /// The closest point of an instrument's surface, and which side of it p is on.
 struct ClosestFeature {

@@ -3,6 +3,7 @@
 #include "tissue_sim/geometry/aabb_tree.h"
 #include "tissue_sim/geometry/closest_point.h"
 #include "tissue_sim/geometry/triangle_mesh.h"
+#include "tissue_sim/geometry/turned_box.h"
 
 namespace tissue_sim {
 
@@ -30,6 +31,10 @@ struct SurfacePatches {
   std::vector<int> leaf_of;   ///< per patch, into nodes
   std::vector<Node> nodes;    ///< depth first: every child stands after its parent
   double travel = 0.0;        ///< m; whoever moves vertices adds the farthest way of one
+
+  std::vector<int> near;  ///< nodes: the leaves that overlap near_box, while travel is near_at
+  TurnedBox near_box = {Box(), Pose()};
+  double near_at = -1e300;  ///< m
 };
 
 SurfacePatches build_patches(const std::vector<Vector3>& positions, const std::vector<Triangle>& triangles,
@@ -72,21 +77,21 @@ inline void place_vertex(const OrganSurface& organ, int vertex) {
 /// The same for all that touch a triangle: its normals at corners and rims need them.
 void place_around(const OrganSurface& organ, int triangle);
 
-/// Calls visit(patch) for every patch whose box overlaps `box`, in a fixed order, its vertices placed and its box
-/// exact.
-template <class Visit>
-void for_each_patch_near(const OrganSurface& organ, const Box& box, Visit&& visit, int node = 0) {
+/// Calls visit(patch) for every patch whose box overlaps the region (a Box, or what else can tell), in a fixed order,
+/// its vertices placed and its box exact.
+template <class Region, class Visit>
+void for_each_patch_near(const OrganSurface& organ, const Region& region, Visit&& visit, int node = 0) {
   SurfacePatches& patches = organ.patches;
   SurfacePatches::Node& here = patches.nodes[node];
   const double outrun = patches.travel - here.fitted_at;
-  if (!here.box.grown(outrun).overlaps(box)) return;
+  if (!region.overlaps(here.box.grown(outrun))) return;
   if (here.patch >= 0) {
     fit_patch(organ, here);
-    if (here.box.overlaps(box)) visit(here.patch);
+    if (region.overlaps(here.box)) visit(here.patch);
     return;
   }
-  for_each_patch_near(organ, box, visit, node + 1);
-  for_each_patch_near(organ, box, visit, here.right);
+  for_each_patch_near(organ, region, visit, node + 1);
+  for_each_patch_near(organ, region, visit, here.right);
   if (outrun == 0.0) return;
   // What is far below it stays as it is.
   here.box = Box();
@@ -95,6 +100,9 @@ void for_each_patch_near(const OrganSurface& organ, const Box& box, Visit&& visi
   }
   here.fitted_at = patches.travel;
 }
+
+/// Gathers the patches near a box for the searches that follow, while nothing moves.
+void gather_near(const OrganSurface& organ, const TurnedBox& box);
 
 /// The point of the organ nearest to p (scene frame), as closest_on_mesh finds it.
 ClosestOnMesh closest_on_organ(const OrganSurface& organ, const Vector3& p, double reach, int guess = -1);

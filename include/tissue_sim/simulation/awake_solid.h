@@ -16,7 +16,9 @@ struct Follower {
 /// A free vertex that a spring pulls towards the coarser level.
 struct BandVertex {
   int vertex = 0;          ///< among the awake ones
+  double mass = 0.0;       ///< kg, of the vertex
   double stiffness = 0.0;  ///< N/m, of the spring: 0 where the band begins
+  double damping = 0.0;    ///< N s/m, of the motion against the coarser level
   Follower follower;
   Eigen::Vector4f target = Eigen::Vector4f::Zero();    ///< m, as AwakeSolid::displacements
   Eigen::Vector4f velocity = Eigen::Vector4f::Zero();  ///< m/s, of the target
@@ -75,8 +77,8 @@ void follow(const AwakeSolid& coarser, const Vector3& common, AwakeSolid& finer)
 /// Moves them on in a line for dt (s).
 void follow_on(double dt, AwakeSolid& awake);
 
-/// The forces (N) of tetrahedra and band on the free vertices. A spring is no stiffer than a substep of dt (s) is
-/// stable for.
+/// The forces (N) of tetrahedra and band on the free vertices. A spring is no stiffer, and no more damped, than a
+/// substep of dt (s) is stable for.
 void solid_forces(const RestShape& shape, double dt, AwakeSolid& awake);
 
 }  // namespace tissue_sim

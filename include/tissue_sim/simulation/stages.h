@@ -46,10 +46,20 @@ void recall(StepContext& context);
 int count_substeps(StepContext& context);
 
 void place_instruments(StepContext& context, int substep, int substeps);
+
+/// Whether contact is looked for in this substep: in the first of a step, and where an instrument and the organ can
+/// have moved too far against each other since it last was.
+bool looks_again(StepContext& context);
+
 void refit(StepContext& context);
 void find_crossings(StepContext& context);
 void find_border_depths(StepContext& context);
 void propagate_depths(StepContext& context);
+void find_contacts(StepContext& context);
+
+/// The contacts found last go along with their instruments.
+void follow_instruments(StepContext& context);
+
 void respond(StepContext& context);
 void deform(StepContext& context);
 void bear(StepContext& context);

@@ -32,7 +32,8 @@ struct OrganWorkspace {
   SurfacePatches patches;                 ///< of the organ's surface
   std::vector<Detection> detections;      ///< per piece
   std::vector<Penetration> penetrations;  ///< per piece
-  std::vector<char> near;                 ///< per piece: its box and the organ's overlap in this substep
+  std::vector<char> near;                 ///< per piece: its box and the organ's overlap
+  std::vector<double> looked_at;          ///< m, per piece: what had been travelled when contact was looked for
   std::vector<ContactPoint> points;
   ElementRoom elements;
   LevelsRoom levels;

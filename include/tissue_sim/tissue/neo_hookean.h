@@ -107,13 +107,21 @@ struct NeoHookeanElement {
 
   /// How stiffly the tetrahedron holds the corner, N/m: the largest eigenvalue of its block, and what volume that is
   /// lost or won adds between corners. Grows where the tetrahedron is stretched or pressed flat.
-  double stiffness(const Vectors& x, std::size_t corner) const {
+  double stiffness(const Vectors& x, std::size_t corner) const { return stiffnesses(x)[corner]; }
+
+  /// The same of all four.
+  std::array<double, 4> stiffnesses(const Vectors& x) const {
     const Matrix3 f = deformation_gradient(x);
     const Matrix3 c = cofactors(f);
-    const Vector3 g = shape_gradient(corner);
     const double stiff = moduli.lambda + moduli.mu;
     const double stretch = f.col(0).dot(c.col(0)) - 1.0;
-    return volume * ((moduli.mu + std::abs(stiff * stretch)) * g.squaredNorm() + stiff * (c * g).squaredNorm());
+    std::array<double, 4> of_corners{};
+    for (std::size_t corner = 0; corner < 4; ++corner) {
+      const Vector3 g = shape_gradient(corner);
+      of_corners[corner] =
+          volume * ((moduli.mu + std::abs(stiff * stretch)) * g.squaredNorm() + stiff * (c * g).squaredNorm());
+    }
+    return of_corners;
   }
 
   /// Second derivative of the energy by corners i (rows) and j (columns), N/m. Exact, so not always positive definite.
