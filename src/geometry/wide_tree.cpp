@@ -186,7 +186,7 @@ struct PackingOrder {
     }
   }
 };
-constexpr PackingOrder packing_order;
+[[maybe_unused]] constexpr PackingOrder packing_order;  // by clang
 
 /// Writes the chosen lanes of eight one behind the other, and anything behind them.
 template <class Lane, class Number>
@@ -254,16 +254,16 @@ struct PackedIn {
     constexpr std::size_t width = bytes / sizeof(float);
     constexpr unsigned all = (1U << width) - 1;
     const float unsure = unsure_height(farthest);
-    for (std::size_t group = 0; group < count; group += width) {
+    for (std::size_t from = 0; from < count; from += width) {
       // Copies, since a byte that is written might be anybody's.
       Lane lower[3], upper[3], normal[3];
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        lower[axis] = lane<Lane>(near.lower[axis], first + group);
-        upper[axis] = lane<Lane>(near.upper[axis], first + group);
-        normal[axis] = lane<Lane>(near.normal[axis], first + group);
+        lower[axis] = lane<Lane>(near.lower[axis], first + from);
+        upper[axis] = lane<Lane>(near.upper[axis], first + from);
+        normal[axis] = lane<Lane>(near.normal[axis], first + from);
       }
-      const Lane offset = lane<Lane>(near.offset, first + group);
-      const std::size_t shift = width < lanes ? group % lanes : 0;
+      const Lane offset = lane<Lane>(near.offset, first + from);
+      const std::size_t shift = width < lanes ? from % lanes : 0;
       for (std::size_t i = 0; i < edges.point_count; ++i) {
         const FloatPoint p = edges.points[i];
         std::array<unsigned, PointCodes::kinds> bits;
@@ -275,7 +275,7 @@ struct PackedIn {
         bits[PointCodes::not_in_front] = all & ~bits_of(height > unsure);  // also where it is not a number
         bits[PointCodes::not_behind] = all & ~bits_of(height < -unsure);
         for (std::size_t kind = 0; kind < PointCodes::kinds; ++kind) {
-          unsigned char& byte = codes[i].bytes[kind][group / lanes];
+          unsigned char& byte = codes[i].bytes[kind][from / lanes];
           byte = static_cast<unsigned char>(bits[kind] << shift | (shift != 0 ? byte : 0U));
         }
       }

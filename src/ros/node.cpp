@@ -113,7 +113,7 @@ void Node::advertise() {
         instrument.pose_topic, queue, take, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay());
     ROS_INFO_STREAM("instrument \"" << instrument.name << "\" follows " << inputs_[i].subscriber.getTopic());
   }
-  const std::string own = ros::this_node::getName();
+  const std::string& own = ros::this_node::getName();
   registration_ = std::make_unique<Registration>(std::vector<std::string>{
       reset_server_.getService(), topology_server_.getService(), own + "/get_loggers", own + "/set_logger_level"});
 }

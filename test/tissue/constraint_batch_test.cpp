@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <set>
@@ -105,7 +106,8 @@ double sum_of(const std::vector<EnclosedShare>& shares, const FloatLanes Enclose
 
 template <class Item>
 bool same_bits(const std::vector<Item>& a, const std::vector<Item>& b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(Item)) == 0;
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const Item& x, const Item& y) { return std::memcmp(&x, &y, sizeof(Item)) == 0; });
 }
 
 Organ wall_of(const TriangleMesh& mesh) {
