@@ -214,6 +214,20 @@ TEST(Step, AnInstrumentWithoutAPoseIsNotThere) {
   }
 }
 
+/// Of an organ that is inside out all the world is below the surface. A recovery forgets how far it reaches, and what
+/// stood 5 m away once poked into it then.
+TEST(Step, WhatIsFarFromAnOrganInsideOutDoesNotPoke) {
+  Simulation simulation(scene_of(wall_sphere(8), {ball(0.01)}));
+  const Pose away = {{0.0, 0.0, 5.0}, Eigen::Quaterniond::Identity()};
+  simulation.start_at(away);
+  for (Vector3& v : simulation.state.organs[0].positions) v.z() = -v.z();
+  simulation.state.organs[0].asleep = false;
+  forget(simulation.workspace.organs[0]);
+  simulation.go_to(away);
+  EXPECT_FALSE(simulation.report.recovered);
+  EXPECT_TRUE(simulation.report.contacts.empty());
+}
+
 TEST(Step, ARecoveryOfOneOrganLeavesTheOthersWrench) {
   // Two balls of one instrument press an organ each.
   Scene scene = scene_of(wall_sphere(16), {ball(ball_radius)});
