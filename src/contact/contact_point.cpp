@@ -212,7 +212,7 @@ void add_poke_contacts(const OrganSurface& organ, const InstrumentSurface& instr
     if (!below_surface) clearance.first_touch[u] = travelled + distance;
     if (!below_surface && !(distance < poke_reach)) continue;
 
-    const Vector3 direction = distance < 1e-9 ? Vector3(-outward.stableNormalized())
+    const Vector3 direction = distance < 1e-9 ? Vector3(-unit_or_zero(outward))
                               : below_surface ? Vector3(above / distance)
                                               : Vector3(-above / distance);
     const double side = longest_side(organ, closest.triangle);
