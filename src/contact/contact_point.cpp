@@ -191,6 +191,8 @@ void add_edge_contacts(const OrganSurface& organ, const InstrumentSurface& instr
 void add_poke_contacts(const OrganSurface& organ, const InstrumentSurface& instrument, int piece, const Pose& pose,
                        const std::vector<int>& vertices, Clearance& clearance, std::vector<ContactPoint>& points) {
   const std::size_t first = points.size();
+  // Of an organ that was left inside out all the world is below the surface, metres away too.
+  const Box bounds = bounds_of(organ.patches);
   for (const int u : vertices) {
     const bool poked_before = clearance.pokes[u] != 0;
     clearance.pokes[u] = 0;
@@ -208,7 +210,7 @@ void add_poke_contacts(const OrganSurface& organ, const InstrumentSurface& instr
     const Vector3 outward =
         pseudonormal(organ.positions, organ.triangles, organ.topology, closest.triangle, closest.on.feature);
     const Vector3 above = tip - closest.on.point;
-    const bool below_surface = !(above.dot(outward) > 0.0);
+    const bool below_surface = bounds.contains(tip) && !(above.dot(outward) > 0.0);
     if (!below_surface) clearance.first_touch[u] = travelled + distance;
     if (!below_surface && !(distance < poke_reach)) continue;
 

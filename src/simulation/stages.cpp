@@ -356,11 +356,7 @@ void refit(StepContext& context) {
     const bool placed = context.motion.instruments[piece.instrument].placed;
     const Box box = scene_bounds(piece.surface.bounds, context.workspace.now[piece.instrument]).grown(poke_reach);
     work.near[p] = placed && box.overlaps(bounds_of(work.patches)) ? 1 : 0;
-    if (!work.near[p]) continue;
-    for_each_patch_near(surface, box, [](int) {});
-    // The box may have held all that could be, as after a recovery. Of an organ that is inside out, what is metres away
-    // from it would be below its surface, and poke.
-    work.near[p] = box.overlaps(bounds_of(work.patches)) ? 1 : 0;
+    if (work.near[p]) for_each_patch_near(surface, box, [](int) {});
   }
 }
 
