@@ -195,6 +195,8 @@ void add_poke_contacts(const OrganSurface& organ, const InstrumentSurface& instr
                        const std::vector<int>& vertices, Clearance& clearance, std::vector<ContactPoint>& points) {
   const std::size_t first = points.size();
   gather_near(organ, TurnedBox(instrument.bounds.grown(near_reach), pose));
+  // Of an organ that was left inside out all the world is below the surface, metres away too.
+  const Box bounds = bounds_of(organ.patches);
   for (const int u : vertices) {
     const bool poked_before = clearance.pokes[u] != 0;
     clearance.pokes[u] = 0;
@@ -212,11 +214,11 @@ void add_poke_contacts(const OrganSurface& organ, const InstrumentSurface& instr
     const Vector3 outward =
         pseudonormal(organ.positions, organ.triangles, organ.topology, closest.triangle, closest.on.feature);
     const Vector3 above = tip - closest.on.point;
-    const bool below_surface = !(above.dot(outward) > 0.0);
+    const bool below_surface = bounds.contains(tip) && !(above.dot(outward) > 0.0);
     if (!below_surface) clearance.first_touch[u] = travelled + distance;
     if (!below_surface && !(distance < poke_reach)) continue;
 
-    const Vector3 direction = distance < 1e-9 ? Vector3(-outward.stableNormalized())
+    const Vector3 direction = distance < 1e-9 ? Vector3(-unit_or_zero(outward))
                               : below_surface ? Vector3(above / distance)
                                               : Vector3(-above / distance);
     const double side = longest_side(organ, closest.triangle);

@@ -45,7 +45,7 @@ Vector3 normal_at(const InstrumentSurface& surface, int triangle, Feature featur
   for (const int t : surface.topology.edge_triangles[surface.topology.triangle_edges[triangle][which]]) {
     if (t >= 0) sum += surface.normals[t];
   }
-  return sum.stableNormalized();
+  return unit_or_zero(sum);
 }
 
 }  // namespace
@@ -62,7 +62,7 @@ InstrumentSurface build_instrument_surface(const TriangleMesh& mesh, bool closed
   for (const auto& [a, b, c] : mesh.triangles) {
     const Vector3 normal = area_normal(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]);
     surface.planes.push_back({mesh.vertices[a], normal});
-    surface.normals.push_back(normal.stableNormalized());
+    surface.normals.push_back(unit_or_zero(normal));
   }
   surface.tree = build_wide_tree(mesh.vertices, mesh.triangles);
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
@@ -70,9 +70,8 @@ InstrumentSurface build_instrument_surface(const TriangleMesh& mesh, bool closed
     const int triangle = *surface.topology.vertex_triangles.begin(vertex);
     const Triangle& corners = mesh.triangles[triangle];
     const int corner = corners[0] == vertex ? 0 : corners[1] == vertex ? 1 : 2;
-    surface.vertex_normals.push_back(
-        pseudonormal(mesh.vertices, mesh.triangles, surface.topology, triangle, static_cast<Feature>(corner))
-            .stableNormalized());
+    surface.vertex_normals.push_back(unit_or_zero(
+        pseudonormal(mesh.vertices, mesh.triangles, surface.topology, triangle, static_cast<Feature>(corner))));
   }
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
     surface.radii.push_back(radius_at(surface, static_cast<int>(v)));

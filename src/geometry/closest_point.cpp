@@ -94,7 +94,7 @@ Vector3 pseudonormal(const std::vector<Vector3>& vertices, const std::vector<Tri
     const int edge = topology.triangle_edges[triangle][which];
     Vector3 sum = Vector3::Zero();
     for (const int t : topology.edge_triangles[edge]) {
-      if (t >= 0) sum += face_normal(t).stableNormalized();
+      if (t >= 0) sum += unit_or_zero(face_normal(t));
     }
     return sum;
   }
@@ -104,7 +104,7 @@ Vector3 pseudonormal(const std::vector<Vector3>& vertices, const std::vector<Tri
     const Triangle& corners = triangles[*t];
     const int i = corners[0] == vertex ? 0 : corners[1] == vertex ? 1 : 2;
     const double angle = angle_between(corner(*t, i + 1) - corner(*t, i), corner(*t, i + 2) - corner(*t, i));
-    sum += angle * face_normal(*t).stableNormalized();
+    sum += angle * unit_or_zero(face_normal(*t));
   }
   return sum;
 }

@@ -330,7 +330,7 @@ std::vector<Vector3> vertex_normals(const TriangleMesh& mesh) {
     const Vector3 normal = area_normal(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]);
     for (const int v : t) normals[v] += normal;
   }
-  for (Vector3& normal : normals) normal.stableNormalize();
+  for (Vector3& normal : normals) normal = unit_or_zero(normal);
   return normals;
 }
 

@@ -664,7 +664,7 @@ struct Builder {
 
   /// Zero also where rounding leaves so little of a sliver's plane that its corners are not on it.
   static Vector3 plane_normal(const Vector3& a, const Vector3& b, const Vector3& c) {
-    const Vector3 normal = area_normal(a, b, c).stableNormalized();
+    const Vector3 normal = unit_or_zero(area_normal(a, b, c));
     const double size =
         std::max({a.lpNorm<Eigen::Infinity>(), b.lpNorm<Eigen::Infinity>(), c.lpNorm<Eigen::Infinity>()});
     const double off = std::max(std::abs(normal.dot(b - a)), std::abs(normal.dot(c - a)));
@@ -740,7 +740,7 @@ ClosestOnMesh closest_on_mesh(const std::vector<Vector3>& vertices, const std::v
 ClosestOnMesh free_around(const std::vector<Vector3>& vertices, const std::vector<Triangle>& triangles,
                           const WideTree& tree, const Vector3& p, double little, double enough, int guess,
                           Registers registers) {
-  ClosestSearch search(vertices, triangles, p, std::numeric_limits<double>::max());
+  ClosestSearch search(vertices, triangles, p, std::numeric_limits<double>::infinity());
   if (!p.allFinite()) return search.best;
   if (guess >= 0) search.look_at(guess);
   const Wanted wanted = {little * little, enough * enough};

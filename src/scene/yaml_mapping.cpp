@@ -269,7 +269,7 @@ double YamlMapping::fraction(const std::string& key) const {
     if (!text.empty() && text.back() == ' ') text.pop_back();
     fraction = 0.01 * to_number(text);
   }
-  if (fraction > 0.0 && fraction <= 1.0) return fraction;
+  if (!std::isnan(fraction) && fraction > 0.0 && fraction <= 1.0) return fraction;
   fail(key, "is " + shown(node) + ", allowed is a part above 0% and at most 100%, such as 5% or 0.05");
 }
 

@@ -1,5 +1,6 @@
 #include "tissue_sim/simulation/pose_track.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace tissue_sim {
@@ -9,6 +10,12 @@ constexpr double farthest = 1000.0;                                             
 constexpr std::int64_t latest = (4'294'967'295 - 86'400) * std::int64_t{1'000'000'000};  ///< ns: 2^32 s but for a day
 constexpr double shortest_quaternion = 1e-6;
 constexpr double off_unit_length = 1e-3;  ///< of a quaternion: rounding and drift stay well below
+
+/// Eigen's own takes each from itself, which is a floating-point exception for infinity.
+template <class Vector>
+bool are_numbers(const Vector& vector) {
+  return std::all_of(vector.data(), vector.data() + vector.size(), [](double x) { return std::isfinite(x); });
+}
 }  // namespace
 
 const char* to_string(PoseVerdict verdict) {
@@ -52,7 +59,7 @@ PoseVerdict judge_pose(StampedPose& pose, bool& normalised) {
   if (pose.stamp <= 0) return PoseVerdict::zero_stamp;
   if (pose.stamp > latest) return PoseVerdict::late_stamp;
   Eigen::Vector4d& q = pose.pose.orientation.coeffs();
-  if (!pose.pose.position.allFinite() || !q.allFinite()) return PoseVerdict::non_finite;
+  if (!are_numbers(pose.pose.position) || !are_numbers(q)) return PoseVerdict::non_finite;
   if (pose.pose.position.cwiseAbs().maxCoeff() > farthest) return PoseVerdict::too_far;
   const double largest = q.cwiseAbs().maxCoeff();
   if (!(largest > shortest_quaternion)) return PoseVerdict::zero_quaternion;

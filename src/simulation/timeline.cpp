@@ -234,6 +234,7 @@ void Timeline::Impl::make_step() {
 void Timeline::Impl::reset_organ(int organ) {
   state.organs[organ] = rest_state(world, organ);
   workspace.organs[organ].last_good = state.organs[organ];
+  workspace.organs[organ].bad_steps = 0;
   forget(workspace.organs[organ]);
   hash = hash_state(world.organs[organ], state.organs[organ], hash);
   ++counters.resets;

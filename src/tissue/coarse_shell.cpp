@@ -56,7 +56,7 @@ std::vector<Vector3> vertex_normals(const TriangleMesh& mesh) {
 /// 1/m, of each vertex: the root of the mean square over its edges of how the normal turns along them.
 std::vector<double> curvatures(const TriangleMesh& mesh) {
   std::vector<Vector3> normals = vertex_normals(mesh);
-  for (Vector3& normal : normals) normal.stableNormalize();
+  for (Vector3& normal : normals) normal = unit_or_zero(normal);
   std::vector<double> squares(mesh.vertices.size(), 0.0);
   std::vector<int> edges(mesh.vertices.size(), 0);
   for (const Triangle& t : mesh.triangles) {

@@ -43,10 +43,13 @@ TISSUE_SIM_KERNEL void read(const FloatLanes* rows, std::size_t l, Vectors& vect
   vectors.z = lane<Lane>(&rows[2][l]);
 }
 
-/// 1/p and 1/q with one division; 0 where q is not above zero.
+/// 1/p and 1/q with one division; 0 where their product is not above zero, as in lanes without an element. Those divide
+/// by one: by zero it is a floating-point exception even where nobody takes what comes out.
 TISSUE_SIM_KERNEL void invert(const Lane& p, const Lane& q, Lane& of_p, Lane& of_q) {
   const Lane none{};
-  const Lane both = q > none ? 1.0F / (p * q) : none;
+  const Lane one = none + 1.0F;
+  const Lane product = p * q;
+  const Lane both = product > none ? 1.0F / (product > none ? product : one) : none;
   of_p = both * q;
   of_q = both * p;
 }

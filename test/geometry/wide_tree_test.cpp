@@ -6,6 +6,7 @@
 #include <numeric>
 #include <set>
 
+#include "floating_point_traps.h"
 #include "geometry/twins.h"
 #include "tissue_sim/geometry/edge_triangle.h"
 #include "tissue_sim/geometry/primitives.h"
@@ -137,6 +138,7 @@ TEST(WideTree, FindsEveryCrossingAndLittleElse) {
 
 /// An organ that ran away has edges that reach to infinity, and those overlap every box that has sides.
 TEST(WideTree, EdgesToInfinityMeetTrianglesThatAreThere) {
+  const WithoutTraps off;  // 1e300 is none as a float
   const TriangleMesh mesh = make_octasphere(0.02, 2);
   const WideTree tree = build_wide_tree(mesh.vertices, mesh.triangles);
   constexpr double far = 1e300;
@@ -219,7 +221,7 @@ TEST(WideTree, ClosestPointIsThatOfBruteForceToTheBit) {
     for (int i = 0; i < 60; ++i) {
       const Vector3 on = mesh.vertices[static_cast<std::size_t>(random()) % mesh.vertices.size()];
       const Vector3 p = i % 4 == 0 ? on : i % 4 == 1 ? Vector3(100.0 * on) : on + random_point(random, 0.3 * size);
-      const double reach = i % 3 == 0 ? 0.1 * size : std::numeric_limits<double>::max();
+      const double reach = i % 3 == 0 ? 0.1 * size : std::numeric_limits<double>::infinity();
       ClosestSearch plain(mesh.vertices, mesh.triangles, p, reach);
       for (int t = 0; t < static_cast<int>(mesh.triangles.size()); ++t) plain.look_at(t);
       for (const Registers registers : all_registers()) {
@@ -315,6 +317,7 @@ TEST(WideTree, OfAnySizeHoldsEveryTriangleOnce) {
 }
 
 TEST(WideTree, ManyTrianglesInOnePlaceAndNumbersThatAreNone) {
+  const WithoutTraps off;  // a NaN is compared, 1e30 is squared as a float
   TriangleMesh mesh;
   mesh.vertices = {Vector3::Zero(), Vector3::UnitX(), Vector3::UnitY()};
   mesh.triangles.assign(5000, {0, 1, 2});

@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 
+#include "floating_point_traps.h"
 #include "simulation/solid_scenes.h"
 
 namespace tissue_sim {
@@ -260,7 +261,10 @@ TEST(Levels, AreAsTheyWereBeforeANumberWasNone) {
   for (const Spoil spoil : spoils) {
     const OrganState good = simulation.state.organs[0];
     spoil(simulation.state.organs[0], none);
-    simulation.go_to(simulation.poses[0]);
+    {
+      const WithoutTraps off;  // a NaN is computed with
+      simulation.go_to(simulation.poses[0]);
+    }
     EXPECT_TRUE(simulation.report.recovered);
     const OrganState& organ = simulation.state.organs[0];
     for (const int v : good.region.free) EXPECT_EQ(organ.positions[v], good.positions[v]);

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <cmath>
+#include <limits>
+
 #include "tissue_sim/geometry/triangle_mesh.h"
 
 namespace tissue_sim {
@@ -24,9 +27,10 @@ EdgeTriangleHit hit_edge_triangle(const Vector3& p, const Vector3& q, const std:
 inline EdgeTriangleHit hit_plane(const Vector3& p, const Vector3& q, const Vector3& corner, const Vector3& normal) {
   const double height_p = normal.dot(p - corner);
   const double height_q = normal.dot(q - corner);
-  const double t = height_p / (height_p - height_q);
-  const int hits =
-      static_cast<int>((height_p < 0.0) != (height_q < 0.0)) & static_cast<int>(t >= 0.0) & static_cast<int>(t <= 1.0);
+  // Of heights on two sides the sizes add up to the difference. The least number there is, which changes no other,
+  // keeps an edge in the plane from 0 / 0.
+  const double t = std::abs(height_p) / (std::abs(height_p) + std::abs(height_q) + std::numeric_limits<double>::min());
+  const int hits = static_cast<int>((height_p < 0.0) != (height_q < 0.0)) & static_cast<int>(t <= 1.0);  // not of NaN
   return {hits * (2 * static_cast<int>(height_p < 0.0) - 1), t};
 }
 

@@ -10,6 +10,11 @@ using Vector3 = Eigen::Vector3d;
 using Triangle = std::array<int, 3>;  ///< vertex indices, counter-clockwise seen from outside
 using Edge = std::array<int, 2>;      ///< vertex indices, the smaller first
 
+/// Zero stays zero; Eigen's own would divide it by itself.
+inline Vector3 unit_or_zero(const Vector3& vector) {
+  return vector == Vector3::Zero() ? vector : Vector3(vector.stableNormalized());
+}
+
 /// A triangulated surface. Lengths in metres.
 struct TriangleMesh {
   std::vector<Vector3> vertices;

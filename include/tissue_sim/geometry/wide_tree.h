@@ -81,10 +81,11 @@ struct alignas(64) NearTriangles {
   static constexpr std::size_t most = 256;
   using Row = std::array<float, most + 16>;  ///< as many as a register has are written and read where the last begin
 
-  std::array<Row, 3> lower, upper, normal;  ///< as WideTree::Node and Leaf
-  Row offset;
-  std::array<std::array<Row, 3>, 3> corners;  ///< corner, axis
-  std::array<int, most> triangle;
+  // Set from the start, since what is behind the last is computed too: any bits could be a signalling NaN.
+  std::array<Row, 3> lower{}, upper{}, normal{};  ///< as WideTree::Node and Leaf
+  Row offset{};
+  std::array<std::array<Row, 3>, 3> corners{};  ///< corner, axis
+  std::array<int, most> triangle{};
   std::size_t count = 0;
   float extent = 0.0F;  ///< m, the longest side of the box of any of them
 };
