@@ -21,18 +21,6 @@ TEST(InstrumentSurface, KnowsItsNormalsAndReach) {
   }
 }
 
-TEST(InstrumentSurface, ItsSceneBoundsHoldItAndAreTight) {
-  Random random(1);
-  const InstrumentSurface box = build_instrument_surface(make_box({1.0, 2.0, 0.5}), true);
-  for (int round = 0; round < 200; ++round) {
-    const Pose pose = random_pose(random, 1.0);
-    const Box bounds = scene_bounds(box.bounds, pose);
-    const Box exact = bounds_of(moved({box.vertices, box.triangles}, pose).vertices);
-    EXPECT_LT((bounds.lower - exact.lower).norm(), 1e-12);
-    EXPECT_LT((bounds.upper - exact.upper).norm(), 1e-12);
-  }
-}
-
 TEST(ClosestFeature, EqualsBruteForceAndTheWindingNumber) {
   Random random(2);
   for (const TriangleMesh& mesh : {make_octasphere(1.0, 2), make_torus(0.7, 0.25, 9), make_box({1.0, 0.5, 1.4})}) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <set>
 
 #include "floating_point_traps.h"
@@ -91,6 +92,7 @@ TEST(SurfacePatches, FindWhatBruteForceFindsWhereverTheVerticesHaveGone) {
   for (int organ_number = 0; organ_number < 10; ++organ_number) {
     PatchedOrgan organ(make_octasphere(0.03, 3));
     std::size_t found = 0;
+    int gathered = 0;
     for (int round = 0; round < 200; ++round) {
       if (round % 50 == 49) {
         for (Vector3& v : organ.mesh.vertices) v += Vector3(0.02, 0.0, -0.01);
@@ -117,8 +119,19 @@ TEST(SurfacePatches, FindWhatBruteForceFindsWhereverTheVerticesHaveGone) {
         EXPECT_EQ(closest.squared_distance, plain.squared_distance);
         EXPECT_EQ(closest.on.point, plain.on.point);
       }
+
+      const TurnedBox around(Box{-Vector3::Ones(), Vector3::Ones()}.grown(0.02 - 1.0),
+                             {place, random_pose(random, 1.0).orientation});
+      gather_near(organ.surface(), around);
+      const ClosestOnMesh closest = closest_on_organ(organ.surface(), p, reach, plain.triangle);
+      ASSERT_EQ(closest.triangle, plain.triangle);
+      if (plain.triangle >= 0) {
+        EXPECT_EQ(closest.on.point, plain.on.point);
+        gathered += around.contains(p, std::sqrt(plain.squared_distance)) ? 1 : 0;
+      }
     }
     EXPECT_GT(found, 200u);
+    EXPECT_GT(gathered, 20) << "searches among what was gathered";
   }
 }
 

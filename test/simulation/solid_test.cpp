@@ -340,5 +340,23 @@ TEST(SolidOrgan, ASliverChangesTheForceByAThousandthAtMost) {
   EXPECT_NEAR(with_sliver / clean, 1.0, 1e-3);
 }
 
+/// A step in which contact is looked for once, at its start: at its end the contacts are where the instrument is then.
+TEST(Solid, ContactsGoAlongWithTheInstrument) {
+  Simulation simulation = pressed(soft_block(Model::fem, 6), 100);
+  const double deeper = 2e-5;
+  const Pose pose = ball_over_block(radius, depth + deeper);
+  simulation.go_to(pose);
+
+  ASSERT_GE(simulation.report.substeps, 3);
+  const InstrumentSurface& ball = simulation.world.pieces[0].surface;
+  const Clearance& clearance = simulation.state.organs[0].clearances[0];
+  const double since = clearance.shift + clearance.turn * ball.reach - simulation.workspace.organs[0].looked_at[0];
+  EXPECT_GT(since, 0.5 * deeper) << "it was looked for again";
+  ASSERT_FALSE(simulation.report.contacts.empty());
+  for (const OrganContact& contact : simulation.report.contacts) {
+    EXPECT_LT(closest_feature(ball, pose.apply_inverse(contact.point)).depth, 0.1 * deeper);
+  }
+}
+
 }  // namespace
 }  // namespace tissue_sim
