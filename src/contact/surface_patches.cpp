@@ -127,6 +127,7 @@ SurfacePatches build_patches(const std::vector<Vector3>& positions, const std::v
       patches.patch_of[*v] = patch;
     }
   }
+  patches.near.reserve(patches.leaf_of.size());
   forget(patches);
   return patches;
 }
