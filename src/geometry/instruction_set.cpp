@@ -21,6 +21,7 @@ bool available(InstructionSet set) {
   if (set == InstructionSet::avx2) return __builtin_cpu_supports("avx2") != 0;
   if (set == InstructionSet::avx512) {
     return available(InstructionSet::avx2) && __builtin_cpu_supports("avx512f") != 0 &&
+           __builtin_cpu_supports("avx512bw") != 0 && __builtin_cpu_supports("avx512dq") != 0 &&
            __builtin_cpu_supports("avx512vl") != 0;
   }
 #endif

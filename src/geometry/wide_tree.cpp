@@ -684,24 +684,6 @@ struct Builder {
 
 }  // namespace
 
-bool available(Registers registers) {
-#ifdef __x86_64__
-  if (registers == Registers::wide) return __builtin_cpu_supports("avx2") != 0;
-  if (registers == Registers::widest) {
-    return available(Registers::wide) && __builtin_cpu_supports("avx512f") != 0 &&
-           __builtin_cpu_supports("avx512bw") != 0 && __builtin_cpu_supports("avx512dq") != 0 &&
-           __builtin_cpu_supports("avx512vl") != 0;
-  }
-#endif
-  return registers == Registers::narrow;
-}
-
-Registers widest_registers() {
-  if (instruction_set() == InstructionSet::baseline) return Registers::narrow;
-  return instruction_set() == InstructionSet::avx512 && available(Registers::widest) ? Registers::widest
-                                                                                     : Registers::wide;
-}
-
 WideTree build_wide_tree(const std::vector<Vector3>& vertices, const std::vector<Triangle>& triangles) {
   WideTree tree;
   Builder builder = {vertices, triangles, {}, std::vector<int>(triangles.size()), tree};
@@ -714,21 +696,21 @@ WideTree build_wide_tree(const std::vector<Vector3>& vertices, const std::vector
 }
 
 void find_crossing_pairs(const WideTree& tree, const NearEdges& edges, WideTreeRoom& room,
-                         std::vector<EdgeTrianglePair>& pairs, Registers registers) {
+                         std::vector<EdgeTrianglePair>& pairs, InstructionSet set) {
 #ifdef __x86_64__
-  if (registers == Registers::widest) return find_pairs_widest(tree, edges, room, pairs);
-  if (registers == Registers::wide) return find_pairs_wide(tree, edges, room, pairs);
+  if (set == InstructionSet::avx512) return find_pairs_widest(tree, edges, room, pairs);
+  if (set == InstructionSet::avx2) return find_pairs_wide(tree, edges, room, pairs);
 #endif
   find_pairs_narrow(tree, edges, room, pairs);
 }
 
 ClosestOnMesh closest_on_mesh(const std::vector<Vector3>& vertices, const std::vector<Triangle>& triangles,
-                              const WideTree& tree, const Vector3& p, double reach, int guess, Registers registers) {
+                              const WideTree& tree, const Vector3& p, double reach, int guess, InstructionSet set) {
   ClosestSearch search(vertices, triangles, p, reach);
   if (!p.allFinite()) return search.best;
   if (guess >= 0) search.look_at(guess);
 #ifdef __x86_64__
-  if (registers != Registers::narrow) {
+  if (set != InstructionSet::baseline) {
     closest_wide(tree, p, search);
     return search.best;
   }
@@ -739,13 +721,13 @@ ClosestOnMesh closest_on_mesh(const std::vector<Vector3>& vertices, const std::v
 
 ClosestOnMesh free_around(const std::vector<Vector3>& vertices, const std::vector<Triangle>& triangles,
                           const WideTree& tree, const Vector3& p, double little, double enough, int guess,
-                          Registers registers) {
+                          InstructionSet set) {
   ClosestSearch search(vertices, triangles, p, std::numeric_limits<double>::infinity());
   if (!p.allFinite()) return search.best;
   if (guess >= 0) search.look_at(guess);
   const Wanted wanted = {little * little, enough * enough};
 #ifdef __x86_64__
-  if (registers != Registers::narrow) {
+  if (set != InstructionSet::baseline) {
     free_ball_wide(tree, p, wanted, search);
   } else
 #endif

@@ -77,7 +77,7 @@ bool hits(const TriangleMesh& organ, const Edge& edge, const TriangleMesh& instr
 
 /// Edges of the organ through triangles of the instrument, as stage 1 finds them.
 Pairs hits_by_tree(const TriangleMesh& organ, const std::vector<Edge>& edges, const TriangleMesh& instrument,
-                   Registers registers) {
+                   InstructionSet set) {
   const WideTree tree = build_wide_tree(instrument.vertices, instrument.triangles);
   std::vector<FloatPoint> rounded;
   for (const Vector3& p : organ.vertices) rounded.push_back(to_float(p));
@@ -86,7 +86,7 @@ Pairs hits_by_tree(const TriangleMesh& organ, const std::vector<Edge>& edges, co
   WideTreeRoom room;
   std::vector<EdgeTrianglePair> near;
   const NearEdges given = {rounded.data(), rounded.size(), edges.data(), all.data(), all.size()};
-  find_crossing_pairs(tree, given, room, near, registers);
+  find_crossing_pairs(tree, given, room, near, set);
   Pairs pairs;
   for (const EdgeTrianglePair& pair : near) {
     const auto triangle = static_cast<std::size_t>(pair.triangle);
@@ -133,8 +133,8 @@ TEST(RandomMeshPairs, TreesFindWhatBruteForceFindsAndRefittedWhatRebuiltFinds) {
     }
     const std::vector<Edge> edges = build_topology(static_cast<int>(organ.vertices.size()), organ.triangles).edges;
     const Pairs expected = hits_by_force(organ, edges, instrument);
-    EXPECT_EQ(hits_by_tree(organ, edges, instrument, Registers::narrow), expected);
-    EXPECT_EQ(hits_by_tree(organ, edges, instrument, widest_registers()), expected);
+    EXPECT_EQ(hits_by_tree(organ, edges, instrument, InstructionSet::baseline), expected);
+    EXPECT_EQ(hits_by_tree(organ, edges, instrument, instruction_set()), expected);
     hit += expected.size();
   }
   EXPECT_GT(near, static_cast<std::size_t>(rounds));

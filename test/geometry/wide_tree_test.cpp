@@ -16,9 +16,9 @@ namespace {
 
 using Pair = std::pair<int, int>;
 
-std::vector<Registers> all_registers() {
-  std::vector<Registers> all = {Registers::narrow};
-  for (const Registers wider : {Registers::wide, Registers::widest}) {
+std::vector<InstructionSet> all_sets() {
+  std::vector<InstructionSet> all = {InstructionSet::baseline};
+  for (const InstructionSet wider : {InstructionSet::avx2, InstructionSet::avx512}) {
     if (available(wider)) all.push_back(wider);
   }
   return all;
@@ -56,13 +56,13 @@ std::set<Pair> crossings(const TriangleMesh& mesh, const Edges& edges) {
   return found;
 }
 
-std::vector<Pair> found_pairs(const WideTree& tree, const Edges& edges, Registers registers,
+std::vector<Pair> found_pairs(const WideTree& tree, const Edges& edges, InstructionSet set,
                               std::vector<Pair>* sure = nullptr) {
   WideTreeRoom room;
   std::vector<EdgeTrianglePair> pairs;
   find_crossing_pairs(
       tree, {edges.rounded.data(), edges.rounded.size(), edges.edges.data(), edges.all.data(), edges.all.size()}, room,
-      pairs, registers);
+      pairs, set);
   std::vector<Pair> found;
   for (const EdgeTrianglePair& pair : pairs) {
     found.emplace_back(pair.edge, pair.triangle);
@@ -74,7 +74,7 @@ std::vector<Pair> found_pairs(const WideTree& tree, const Edges& edges, Register
 /// Of lines that surely run within the rims, whatever the registers, the plane alone tells where the edges go through.
 std::size_t expect_same_by_plane(const TriangleMesh& mesh, const WideTree& tree, const Edges& edges) {
   std::vector<Pair> sure;
-  found_pairs(tree, edges, Registers::narrow, &sure);
+  found_pairs(tree, edges, InstructionSet::baseline, &sure);
   for (const auto& [e, t] : sure) {
     const auto& [i, j, k] = mesh.triangles[t];
     const Vector3& a = mesh.vertices[i];
@@ -87,9 +87,9 @@ std::size_t expect_same_by_plane(const TriangleMesh& mesh, const WideTree& tree,
     if (exact.direction == 0) continue;
     EXPECT_EQ(by_plane.t, exact.t);
   }
-  for (const Registers registers : all_registers()) {
+  for (const InstructionSet set : all_sets()) {
     std::vector<Pair> other;
-    found_pairs(tree, edges, registers, &other);
+    found_pairs(tree, edges, set, &other);
     EXPECT_EQ(other, sure);
   }
   return sure.size();
@@ -100,11 +100,11 @@ std::size_t expect_all_crossings(const TriangleMesh& mesh, const Edges& edges, s
                                  std::size_t& looked_at) {
   const WideTree tree = build_wide_tree(mesh.vertices, mesh.triangles);
   const std::set<Pair> expected = crossings(mesh, edges);
-  const std::vector<Pair> narrow = found_pairs(tree, edges, Registers::narrow);
+  const std::vector<Pair> narrow = found_pairs(tree, edges, InstructionSet::baseline);
   const std::set<Pair> once(narrow.begin(), narrow.end());
   EXPECT_EQ(once.size(), narrow.size()) << "a pair twice";
   EXPECT_TRUE(std::includes(once.begin(), once.end(), expected.begin(), expected.end()));
-  for (const Registers registers : all_registers()) EXPECT_EQ(found_pairs(tree, edges, registers), narrow);
+  for (const InstructionSet set : all_sets()) EXPECT_EQ(found_pairs(tree, edges, set), narrow);
   crossed += expected.size();
   looked_at += narrow.size();
   return expect_same_by_plane(mesh, tree, edges);
@@ -147,8 +147,8 @@ TEST(WideTree, EdgesToInfinityMeetTrianglesThatAreThere) {
   edges.add({-far, 0.0, 0.0}, {far, 0.0, 0.0});
   edges.add({0.0, 0.0, 0.0}, {0.0, far, 0.0});
   edges.add(Vector3::Constant(std::numeric_limits<double>::quiet_NaN()), {far, far, far});
-  for (const Registers registers : all_registers()) {
-    const std::vector<Pair> pairs = found_pairs(tree, edges, registers);
+  for (const InstructionSet set : all_sets()) {
+    const std::vector<Pair> pairs = found_pairs(tree, edges, set);
     EXPECT_FALSE(pairs.empty());
     for (const Pair& pair : pairs) {
       EXPECT_TRUE(pair.second >= 0 && pair.second < static_cast<int>(mesh.triangles.size())) << pair.second;
@@ -224,10 +224,9 @@ TEST(WideTree, ClosestPointIsThatOfBruteForceToTheBit) {
       const double reach = i % 3 == 0 ? 0.1 * size : std::numeric_limits<double>::infinity();
       ClosestSearch plain(mesh.vertices, mesh.triangles, p, reach);
       for (int t = 0; t < static_cast<int>(mesh.triangles.size()); ++t) plain.look_at(t);
-      for (const Registers registers : all_registers()) {
+      for (const InstructionSet set : all_sets()) {
         for (const int guess : {-1, i % static_cast<int>(mesh.triangles.size()), plain.best.triangle}) {
-          const ClosestOnMesh closest =
-              closest_on_mesh(mesh.vertices, mesh.triangles, tree, p, reach, guess, registers);
+          const ClosestOnMesh closest = closest_on_mesh(mesh.vertices, mesh.triangles, tree, p, reach, guess, set);
           ASSERT_EQ(closest.triangle, plain.best.triangle);
           EXPECT_EQ(closest.squared_distance, plain.best.squared_distance);
           EXPECT_EQ(closest.on.point, plain.best.on.point);
@@ -258,8 +257,8 @@ TEST(WideTree, ThePlanesOfSliversHideNothing) {
     const Vector3 p = on + random_point(random, std::pow(10.0, random_in(random, -12.0, -3.0)));
     ClosestSearch plain(mesh.vertices, mesh.triangles, p, 1.0);
     for (int t = 0; t < static_cast<int>(mesh.triangles.size()); ++t) plain.look_at(t);
-    for (const Registers registers : all_registers()) {
-      const ClosestOnMesh closest = closest_on_mesh(mesh.vertices, mesh.triangles, tree, p, 1.0, -1, registers);
+    for (const InstructionSet set : all_sets()) {
+      const ClosestOnMesh closest = closest_on_mesh(mesh.vertices, mesh.triangles, tree, p, 1.0, -1, set);
       ASSERT_EQ(closest.triangle, plain.best.triangle);
       EXPECT_EQ(closest.squared_distance, plain.best.squared_distance);
     }
@@ -279,7 +278,7 @@ TEST(WideTree, AFreeBallIsFreeAndExactWhereThatIsAskedFor) {
       const double distance = std::sqrt(closest_on_mesh(mesh.vertices, mesh.triangles, tree, p, 1e3).squared_distance);
       for (const int guess : {-1, i % static_cast<int>(mesh.triangles.size())}) {
         const ClosestOnMesh free =
-            free_around(mesh.vertices, mesh.triangles, tree, p, little, enough, guess, Registers::narrow);
+            free_around(mesh.vertices, mesh.triangles, tree, p, little, enough, guess, InstructionSet::baseline);
         const double radius = std::sqrt(free.squared_distance);
         EXPECT_GE(free.triangle, 0);
         EXPECT_LE(radius, distance * (1.0 + 1e-12));
@@ -287,9 +286,8 @@ TEST(WideTree, AFreeBallIsFreeAndExactWhereThatIsAskedFor) {
         EXPECT_EQ(radius > little, distance > little);
         EXPECT_GE(radius, (distance > little ? std::min(distance, enough) : 0.79 * distance) * (1.0 - 1e-12));
         given_away += radius < 0.9 * distance ? 1 : 0;
-        for (const Registers registers : all_registers()) {
-          const ClosestOnMesh same =
-              free_around(mesh.vertices, mesh.triangles, tree, p, little, enough, guess, registers);
+        for (const InstructionSet set : all_sets()) {
+          const ClosestOnMesh same = free_around(mesh.vertices, mesh.triangles, tree, p, little, enough, guess, set);
           EXPECT_EQ(same.triangle, free.triangle);
           EXPECT_EQ(same.squared_distance, free.squared_distance);
         }
@@ -325,14 +323,14 @@ TEST(WideTree, ManyTrianglesInOnePlaceAndNumbersThatAreNone) {
   EXPECT_LE(tree.height, 6);
   const double none = std::nan("");
   const double big = std::numeric_limits<double>::infinity();
-  for (const Registers registers : all_registers()) {
-    EXPECT_EQ(closest_on_mesh(mesh.vertices, mesh.triangles, tree, {0.2, 0.2, 1.0}, 2.0, -1, registers).triangle, 0);
-    EXPECT_EQ(closest_on_mesh(mesh.vertices, mesh.triangles, tree, {0.2, none, 1.0}, big, -1, registers).triangle, -1);
-    EXPECT_EQ(closest_on_mesh(mesh.vertices, mesh.triangles, tree, {1e30, 0.0, 0.0}, big, -1, registers).triangle, 0);
+  for (const InstructionSet set : all_sets()) {
+    EXPECT_EQ(closest_on_mesh(mesh.vertices, mesh.triangles, tree, {0.2, 0.2, 1.0}, 2.0, -1, set).triangle, 0);
+    EXPECT_EQ(closest_on_mesh(mesh.vertices, mesh.triangles, tree, {0.2, none, 1.0}, big, -1, set).triangle, -1);
+    EXPECT_EQ(closest_on_mesh(mesh.vertices, mesh.triangles, tree, {1e30, 0.0, 0.0}, big, -1, set).triangle, 0);
     Edges edges;
     edges.add({0.2, 0.2, -1.0}, {0.2, none, 1.0});
     edges.add({0.2, 0.2, -1.0}, {0.2, 0.2, 1.0});
-    EXPECT_GE(found_pairs(tree, edges, registers).size(), 5000u);
+    EXPECT_GE(found_pairs(tree, edges, set).size(), 5000u);
   }
 }
 

@@ -10,16 +10,6 @@
 
 namespace tissue_sim {
 
-/// Which registers the boxes are compared in: 16 bytes wide, which every x86-64 has (and other processors by the
-/// compiler's own means), 32, or, with packed triangles, 64. Which pairs come out of a query depends on none of them.
-enum class Registers { narrow, wide, widest };
-
-/// Whether this build has code for it and this processor can run it. `narrow` always is.
-bool available(Registers registers);
-
-/// What instruction_set() has.
-Registers widest_registers();
-
 /// A point in single precision, rounded; the fourth number is nothing.
 using FloatPoint = std::array<float, 4>;
 
@@ -129,18 +119,18 @@ struct WideTreeRoom {
 /// Appends the pairs of edges and triangles of the tree that may cross: every pair that does (see hit_edge_triangle),
 /// few that do not, the pairs of an edge together.
 void find_crossing_pairs(const WideTree& tree, const NearEdges& edges, WideTreeRoom& room,
-                         std::vector<EdgeTrianglePair>& pairs, Registers registers = widest_registers());
+                         std::vector<EdgeTrianglePair>& pairs, InstructionSet set = instruction_set());
 
 /// A ball around p that the surface does not reach into: `squared_distance` is the square of its radius, and `triangle`
 /// one near to p, or -1 where p is not a number. The largest such ball where its radius is between `little` and
 /// `enough` (m); else at least four fifths of that, on the same side of both: that takes a fraction of the search.
 ClosestOnMesh free_around(const std::vector<Vector3>& vertices, const std::vector<Triangle>& triangles,
                           const WideTree& tree, const Vector3& p, double little, double enough, int guess = -1,
-                          Registers registers = widest_registers());
+                          InstructionSet set = instruction_set());
 
 /// As closest_on_mesh.
 ClosestOnMesh closest_on_mesh(const std::vector<Vector3>& vertices, const std::vector<Triangle>& triangles,
                               const WideTree& tree, const Vector3& p, double reach, int guess = -1,
-                              Registers registers = widest_registers());
+                              InstructionSet set = instruction_set());
 
 }  // namespace tissue_sim
