@@ -1,6 +1,6 @@
 #include <cstdio>
 
-#include "benchmark/counted_allocations.h"
+#include "benchmark/counted_heap.h"
 #include "tissue_sim/study/bench.h"
 #include "tissue_sim/study/soak.h"
 

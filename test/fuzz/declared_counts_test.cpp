@@ -1,61 +1,10 @@
 #include <gtest/gtest.h>
-#include <malloc.h>
 
-#include <atomic>
-#include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <new>
 
+#include "benchmark/counted_heap.h"
 #include "entries.h"
-
-namespace {
-
-std::atomic<std::size_t> live{0}, peak{0};  ///< bytes
-
-void* taken(std::size_t size) {
-  void* const memory = std::malloc(size > 0 ? size : 1);
-  if (!memory) throw std::bad_alloc();
-  const std::size_t now = live += malloc_usable_size(memory);
-  if (now > peak) peak = now;
-  return memory;
-}
-
-void given_back(void* memory) {
-  if (memory) live -= malloc_usable_size(memory);
-  std::free(memory);
-}
-
-}  // namespace
-
-// In the whole program, the libraries that it calls included.
-void* operator new(std::size_t size) {
-  return taken(size);
-}
-void* operator new[](std::size_t size) {
-  return taken(size);
-}
-// The standard library's calls the one above, a sanitizer's does not, and then sees it freed by another.
-void* operator new(std::size_t size, const std::nothrow_t& /*tag*/) noexcept {
-  try {
-    return taken(size);
-  } catch (const std::bad_alloc&) {
-    return nullptr;
-  }
-}
-void operator delete(void* memory) noexcept {
-  given_back(memory);
-}
-void operator delete[](void* memory) noexcept {
-  given_back(memory);
-}
-void operator delete(void* memory, std::size_t) noexcept {
-  given_back(memory);
-}
-void operator delete[](void* memory, std::size_t) noexcept {
-  given_back(memory);
-}
 
 namespace tissue_sim {
 namespace {
@@ -110,12 +59,12 @@ TEST(DeclaredCounts, AreHeldAgainstTheBytesThatAreThere) {
     ASSERT_FALSE(bytes.empty());
     ASSERT_LT(bytes.size(), 5000U);
     claim.enter("");  // what a door keeps ready for all files is no part of the claim
-    const std::size_t before = live;
-    peak = before;
+    const std::size_t before = live_bytes();
+    forget_peak();
     std::string refusal;
     EXPECT_NO_THROW(refusal = claim.enter(bytes));
     EXPECT_FALSE(refusal.empty());
-    EXPECT_LT(peak - before, allowed) << refusal;
+    EXPECT_LT(peak_bytes() - before, allowed) << refusal;
   }
 }
 

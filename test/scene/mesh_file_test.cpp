@@ -7,20 +7,13 @@
 #include <limits>
 #include <sstream>
 
+#include "scene/obj_text.h"
 #include "tissue_sim/geometry/primitives.h"
 #include "tissue_sim/scene/scene.h"
 #include "tissue_sim/study/temporary_folder.h"
 
 namespace tissue_sim {
 namespace {
-
-std::string obj_of(const TriangleMesh& mesh) {
-  std::ostringstream text;
-  text.precision(9);
-  for (const Vector3& p : mesh.vertices) text << "v " << p.transpose() << "\n";
-  for (const Triangle& t : mesh.triangles) text << "f " << t[0] + 1 << " " << t[1] + 1 << " " << t[2] + 1 << "\n";
-  return text.str();
-}
 
 std::string ply_of(const TriangleMesh& mesh) {
   std::ostringstream text;
@@ -83,7 +76,7 @@ std::string error_of(const std::string& path) {
 TEST(OrganMesh, EveryFormatGivesTheSameSurface) {
   const TemporaryFolder folder;
   const TriangleMesh sphere = make_sphere(50.0, 16);
-  for (const std::string& path : {folder.write("a.obj", obj_of(sphere)), folder.write("b.PLY", ply_of(sphere)),
+  for (const std::string& path : {folder.write("a.obj", obj_of(sphere, 9)), folder.write("b.PLY", ply_of(sphere)),
                                   folder.write("c.stl", stl_of(sphere, 0.0f))}) {
     std::vector<std::string> warnings;
     const TriangleMesh mesh = load_organ_mesh(path, 0.001, warnings);
@@ -160,7 +153,7 @@ TEST(OrganMesh, MendsWhatItCanAndSaysWhat) {
   for (Triangle& t : mesh.triangles) std::swap(t[0], t[1]);
   mesh.triangles.push_back(mesh.triangles[7]);
   std::vector<std::string> warnings;
-  const TriangleMesh mended = load_organ_mesh(folder.write("m.obj", obj_of(mesh)), 0.001, warnings);
+  const TriangleMesh mended = load_organ_mesh(folder.write("m.obj", obj_of(mesh, 9)), 0.001, warnings);
   EXPECT_TRUE(inspect(mended).closed_manifold());
   ASSERT_EQ(warnings.size(), 2u);
   EXPECT_NE(warnings[0].find("dropped 1 triangle that stand"), std::string::npos) << warnings[0];
@@ -185,14 +178,14 @@ TEST(OrganMesh, SeveralSurfacesAreOneOrgan) {
     mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
   }
   std::vector<std::string> warnings;
-  EXPECT_EQ(inspect(load_organ_mesh(folder.write("two.obj", obj_of(mesh)), 1.0, warnings)).components, 2);
+  EXPECT_EQ(inspect(load_organ_mesh(folder.write("two.obj", obj_of(mesh, 9)), 1.0, warnings)).components, 2);
 }
 
 TEST(OrganMesh, AHoleIsAnErrorWithItsCount) {
   const TemporaryFolder folder;
   TriangleMesh mesh = make_sphere(1.0, 8);
   mesh.triangles.pop_back();
-  const std::string error = error_of(folder.write("hole.obj", obj_of(mesh)));
+  const std::string error = error_of(folder.write("hole.obj", obj_of(mesh, 9)));
   EXPECT_NE(error.find("3 boundary edges: an organ is a closed surface, close its holes"), std::string::npos) << error;
 }
 
@@ -200,7 +193,7 @@ TEST(OrganMesh, EveryTruncationLoadsOrIsASceneError) {
   const TemporaryFolder folder;
   const TriangleMesh sphere = make_sphere(50.0, 4);
   const std::pair<const char*, std::string> files[] = {
-      {"t.obj", obj_of(sphere)}, {"t.ply", ply_of(sphere)}, {"t.stl", stl_of(sphere, 0.0f)}, {"t.dae", collada}};
+      {"t.obj", obj_of(sphere, 9)}, {"t.ply", ply_of(sphere)}, {"t.stl", stl_of(sphere, 0.0f)}, {"t.dae", collada}};
   for (const auto& [name, text] : files) {
     int refused = 0;
     for (std::size_t length = 0; length < text.size(); length += 7) {
@@ -217,7 +210,7 @@ TEST(InstrumentMesh, HolesAreClosed) {
   mesh.triangles.erase(mesh.triangles.end() - 16, mesh.triangles.end());
   std::vector<std::string> warnings;
   const InstrumentMesh loaded =
-      load_instrument_mesh(folder.write("i.obj", obj_of(mesh)), Vector3::Constant(0.001), warnings);
+      load_instrument_mesh(folder.write("i.obj", obj_of(mesh, 9)), Vector3::Constant(0.001), warnings);
   EXPECT_TRUE(loaded.closed);
   EXPECT_TRUE(inspect(loaded.mesh).closed_manifold());
   ASSERT_EQ(warnings.size(), 1u);
@@ -231,7 +224,7 @@ TEST(InstrumentMesh, WhatCannotBeMendedIsUsed) {
   mesh.triangles.push_back({0, 1, static_cast<int>(mesh.vertices.size()) - 1});  // a fin
   std::vector<std::string> warnings;
   const InstrumentMesh loaded =
-      load_instrument_mesh(folder.write("i.obj", obj_of(mesh)), Vector3::Constant(0.001), warnings);
+      load_instrument_mesh(folder.write("i.obj", obj_of(mesh, 9)), Vector3::Constant(0.001), warnings);
   EXPECT_FALSE(loaded.closed);
   EXPECT_EQ(loaded.mesh.triangles.size(), 481u);
   ASSERT_FALSE(warnings.empty());
@@ -243,7 +236,7 @@ TEST(InstrumentMesh, AMirroredScaleStillFacesOutward) {
   const TemporaryFolder folder;
   std::vector<std::string> warnings;
   const InstrumentMesh loaded =
-      load_instrument_mesh(folder.write("i.obj", obj_of(make_sphere(5.0, 8))), {0.001, -0.001, 0.001}, warnings);
+      load_instrument_mesh(folder.write("i.obj", obj_of(make_sphere(5.0, 8), 9)), {0.001, -0.001, 0.001}, warnings);
   EXPECT_TRUE(loaded.closed);
   EXPECT_GT(enclosed_volume(loaded.mesh), 0.0);
 }

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "benchmark/counted_allocations.h"
+#include "benchmark/counted_heap.h"
 #include "simulation/solid_scenes.h"
 
 namespace tissue_sim {

@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <sstream>
 
+#include "scene/obj_text.h"
 #include "simulation/test_scenes.h"
 #include "tissue_sim/scene/mesh_file.h"
 #include "tissue_sim/scene/tetrahedral_mesh_file.h"
@@ -13,14 +14,6 @@ namespace tissue_sim {
 namespace {
 
 constexpr double radius = 0.03;  // m
-
-std::string obj_of(const TriangleMesh& mesh) {
-  std::ostringstream text;
-  text.precision(17);
-  for (const Vector3& p : mesh.vertices) text << "v " << p.transpose() << "\n";
-  for (const Triangle& t : mesh.triangles) text << "f " << t[0] + 1 << " " << t[1] + 1 << " " << t[2] + 1 << "\n";
-  return text.str();
-}
 
 /// What a press came to.
 struct Press {
@@ -79,7 +72,7 @@ Organ wall_of(const TriangleMesh& mesh, std::vector<std::string>& warnings) {
   const TemporaryFolder folder;
   Organ organ = wall_sphere(4);
   organ.attached.clear();
-  organ.mesh = load_organ_mesh(folder.write("organ.obj", obj_of(mesh)), 1.0, warnings);
+  organ.mesh = load_organ_mesh(folder.write("organ.obj", obj_of(mesh, 17)), 1.0, warnings);
   double bottom = 1.0;
   for (const Vector3& p : organ.mesh.vertices) bottom = std::min(bottom, p.z());
   for (std::size_t v = 0; v < organ.mesh.vertices.size(); ++v) {
