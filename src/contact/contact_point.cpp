@@ -210,7 +210,7 @@ void add_poke_contacts(const OrganSurface& organ, const InstrumentSurface& instr
     const double distance = std::sqrt(closest.squared_distance);
     clearance.nearest[u] = closest.triangle;
     clearance.free_until[u] = travelled + distance - poke_reach;
-    place_around(organ, closest.triangle);
+    if (closest.on.feature != Feature::face) place_around(organ, closest.triangle);
     const Vector3 outward =
         pseudonormal(organ.positions, organ.triangles, organ.topology, closest.triangle, closest.on.feature);
     const Vector3 above = tip - closest.on.point;

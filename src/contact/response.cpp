@@ -73,12 +73,10 @@ double push_out(const std::vector<ContactPoint>& points, const std::vector<doubl
 
 namespace {
 
-/// Gives the points non-negative impulses (in `given`, which holds a guess) so that none approaches its instrument:
-/// Gauss-Seidel over the points in order until next to nothing changes.
-/// `instrument(point)` is the velocity of the instrument there, or its acceleration where those are what is stopped.
-template <class Instrument>
+/// Gives the points non-negative impulses (in `given`, which holds a guess) so that each gets its `pace` along its
+/// direction at least: Gauss-Seidel over the points in order until next to nothing changes.
 void stop(std::vector<ContactPoint>& points, const std::vector<double>& inverse_mass, double ContactPoint::*given,
-          Instrument instrument, std::vector<Vector3>& velocities) {
+          std::vector<Vector3>& velocities) {
   const auto push = [&](const ContactPoint& point, double impulse) {
     for (int i = 0; i < point.bearers.count; ++i) {
       const int vertex = point.bearers.vertices[i];
@@ -95,7 +93,7 @@ void stop(std::vector<ContactPoint>& points, const std::vector<double>& inverse_
     double largest = 0.0;
     for (ContactPoint& point : points) {
       if (!(point.ease > 0.0)) continue;
-      const double approach = point.direction.dot(instrument(point) - at_point(point, velocities));
+      const double approach = point.direction.dot(point.pace - at_point(point, velocities));
       const double impulse = std::max(0.0, point.*given + approach / point.ease);
       const double change = impulse - point.*given;
       push(point, change);
@@ -111,23 +109,23 @@ void stop(std::vector<ContactPoint>& points, const std::vector<double>& inverse_
 
 void stop_at_instrument(std::vector<ContactPoint>& points, const std::vector<double>& inverse_mass,
                         const std::vector<Vector3>& positions, double dt, std::vector<Vector3>& velocities) {
-  const auto moving = [&](const ContactPoint& point) -> Vector3 {
+  for (ContactPoint& point : points) {
     const double ahead = std::max(0.0, point.direction.dot(at_point(point, positions)) - point.target);
-    return point.instrument_velocity - ahead / dt * point.direction;
-  };
-  stop(points, inverse_mass, &ContactPoint::impulse, moving, velocities);
+    point.pace = point.instrument_velocity - ahead / dt * point.direction;
+  }
+  stop(points, inverse_mass, &ContactPoint::impulse, velocities);
 }
 
 void bear_forces(const std::vector<double>& inverse_mass, const std::vector<Vector3>& forces,
                  std::vector<Vector3>& accelerations, std::vector<ContactPoint>& points) {
-  for (const ContactPoint& point : points) {
+  for (ContactPoint& point : points) {
+    point.pace.setZero();  // it stays where it is
     for (int i = 0; i < point.bearers.count; ++i) {
       const int vertex = point.bearers.vertices[i];
       accelerations[vertex] = inverse_mass[vertex] * forces[vertex];
     }
   }
-  const auto still = [](const ContactPoint&) -> Vector3 { return Vector3::Zero(); };
-  stop(points, inverse_mass, &ContactPoint::force, still, accelerations);
+  stop(points, inverse_mass, &ContactPoint::force, accelerations);
 }
 
 }  // namespace tissue_sim

@@ -21,10 +21,10 @@ void make_room(std::size_t count, std::vector<Item>& items) {
   if (items.capacity() < count) items.reserve(spare * count);
 }
 
-Eigen::Vector4f to_floats(const Vector3& v) {
-  Eigen::Vector4f floats;
-  floats << v.cast<float>(), 0.0F;
-  return floats;
+/// Number by number into where it goes: a vector put together elsewhere and copied whole waits for its halves.
+void write_floats(const Vector3& v, Eigen::Vector4f& floats) {
+  for (Eigen::Index i = 0; i < 3; ++i) floats[i] = static_cast<float>(v[i]);
+  floats[3] = 0.0F;
 }
 
 /// The place of a vertex among the awake ones, where it is put last if it is not there.
@@ -176,13 +176,14 @@ void read_motion(const RestShape& shape, const std::vector<Vector3>& positions, 
                  double ahead, const Vector3& common, AwakeSolid& awake) {
   for (std::size_t i = 0; i < awake.free; ++i) {
     const int v = awake.vertices[i];
-    awake.displacements[i] = to_floats(positions[v] - ahead * velocities[v] - shape.positions[v] - common);
-    awake.velocities[i] = to_floats(velocities[v]);
+    write_floats(positions[v] - ahead * velocities[v] - shape.positions[v] - common, awake.displacements[i]);
+    write_floats(velocities[v], awake.velocities[i]);
   }
 }
 
 void follow(const AwakeSolid& coarser, const Vector3& common, AwakeSolid& finer) {
-  const Eigen::Vector4f at_rest = to_floats(-common);
+  Eigen::Vector4f at_rest;
+  write_floats(-common, at_rest);
   const auto go = [&](const Follower& follower, Eigen::Vector4f& displacement, Eigen::Vector4f& velocity) {
     if (follower.attached) {
       displacement = at_rest;

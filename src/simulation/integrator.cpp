@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 namespace tissue_sim {
 
@@ -238,18 +239,22 @@ int substeps_for(const RestShape& rest, double duration, double stiffening) {
 }
 
 double stiffening(const RestShape& rest, const FlatLists& tetrahedra_at, const std::vector<ContactPoint>& points,
-                  const std::vector<Vector3>& positions) {
+                  const std::vector<Vector3>& positions, std::vector<int>& bearers) {
   if (rest.packed.batches.empty()) return 0.0;
-  double stiffest = 0.0;
+  bearers.clear();
   for (const ContactPoint& point : points) {
-    for (int i = 0; i < point.bearers.count; ++i) {
-      const int v = point.bearers.vertices[i];
-      for (const int* t = tetrahedra_at.begin(v); t != tetrahedra_at.end(v); ++t) {
-        const NeoHookeanElement& element = rest.tetrahedra[*t];
-        const std::array<double, 4> stiffnesses = element.stiffnesses(gather(element, positions));
-        for (std::size_t corner = 0; corner < 4; ++corner) {
-          stiffest = std::max(stiffest, stiffnesses[corner] * rest.inverse_mass[element.vertices[corner]]);
-        }
+    bearers.insert(bearers.end(), point.bearers.vertices.begin(), point.bearers.vertices.begin() + point.bearers.count);
+  }
+  std::sort(bearers.begin(), bearers.end());  // neighbours share most of theirs
+  double stiffest = 0.0;
+  int before = -1;
+  for (const int v : bearers) {
+    if (v == std::exchange(before, v)) continue;
+    for (const int* t = tetrahedra_at.begin(v); t != tetrahedra_at.end(v); ++t) {
+      const NeoHookeanElement& element = rest.tetrahedra[*t];
+      const std::array<double, 4> stiffnesses = element.stiffnesses(gather(element, positions));
+      for (std::size_t corner = 0; corner < 4; ++corner) {
+        stiffest = std::max(stiffest, stiffnesses[corner] * rest.inverse_mass[element.vertices[corner]]);
       }
     }
   }

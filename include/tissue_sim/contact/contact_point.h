@@ -30,7 +30,9 @@ struct ContactPoint {
   Vector3 direction = Vector3::UnitZ();           ///< scene frame, unit, out of the instrument
   double target = 0.0;                            ///< m, for the bearers: it shall get `lift` farther itself
   double lift = 0.0;                              ///< m, along direction, from where the bearers put it to where it is
+  Vector3 carried = Vector3::Zero();              ///< m, where its bearers would be had they gone with the instrument
   Vector3 instrument_velocity = Vector3::Zero();  ///< m/s, of the instrument at the point
+  Vector3 pace = Vector3::Zero();                 ///< m/s or m/s^2, least along direction; set by the response
   double ease = 0.0;                              ///< 1/kg, how easily the point moves; set by the response
   double impulse = 0.0;                           ///< N s along direction, on the organ; set by the response
   double force = 0.0;                             ///< N along direction, on the organ; see bear_forces

@@ -16,9 +16,9 @@ constexpr double most_stiffening = 11.2;
 
 /// How much stiffer than the stiffest tetrahedron at rest the stiffest at a contact is now, as squared frequency. Where
 /// a thin instrument presses deep into small tetrahedra that is far beyond what the substep at rest is stable for.
-/// `tetrahedra_at` lists the tetrahedra at each vertex.
+/// `tetrahedra_at` lists the tetrahedra at each vertex; `bearers` is room.
 double stiffening(const RestShape& rest, const FlatLists& tetrahedra_at, const std::vector<ContactPoint>& points,
-                  const std::vector<Vector3>& positions);
+                  const std::vector<Vector3>& positions, std::vector<int>& bearers);
 
 /// Packs the elements into the batches that element_forces() computes.
 void pack_elements(RestShape& rest);

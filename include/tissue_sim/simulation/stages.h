@@ -48,7 +48,8 @@ int count_substeps(StepContext& context);
 void place_instruments(StepContext& context, int substep, int substeps);
 
 /// Whether contact is looked for in this substep: in the first of a step, and where an instrument and the organ can
-/// have moved too far against each other since it last was.
+/// have moved too far against each other since it last was, or a contact point has slipped too far. Finds the
+/// velocities of the instruments at the contact points.
 bool looks_again(StepContext& context);
 
 void refit(StepContext& context);
