@@ -20,7 +20,7 @@ struct TemporaryFolder {
   std::filesystem::path path;
 
   TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "tissue_sim_XXXXXX").string();
+    std::string name = (std::filesystem::temp_directory_path() / "tissue_sim_").string() + std::string(6, 'X');
     if (!mkdtemp(name.data()))
       throw std::runtime_error(name + ": cannot be made, may the temporary folder be written?");
     path = name;
