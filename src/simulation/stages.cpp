@@ -69,6 +69,12 @@ Vector3 velocity_of(const Pose& before, const Pose& now, const Vector3& point, d
   return (point - before.apply(now.apply_inverse(point))) / dt;
 }
 
+/// m, how far an instrument's piece and the organ can have moved against each other so far.
+double travel_of(const StepContext& context, std::size_t piece) {
+  const Clearance& clearance = context.state.clearances[piece];
+  return clearance.shift + clearance.turn * context.world.pieces[piece].surface.reach;
+}
+
 void find_instrument_velocities(StepContext& context) {
   for (ContactPoint& point : context.work().points) {
     const int instrument = context.world.pieces[point.piece].instrument;
@@ -210,11 +216,10 @@ double integrate_elements(StepContext& context) {
   return speed;
 }
 
-/// What has moved by itself: the patches, the clearances and the look for contact have to know.
+/// What has moved by itself: the patches and the clearances have to know.
 void note_motion(StepContext& context, double way) {
   context.work().patches.travel += way;
   for (Clearance& clearance : context.state.clearances) clearance.shift += way;
-  for (double& unseen : context.work().unseen) unseen += way;
 }
 
 void put_last_good_back(StepContext& context) {
@@ -266,7 +271,7 @@ Workspace build_workspace(const World& world, int threads) {
     work.detections.resize(world.pieces.size());
     work.penetrations.resize(world.pieces.size());
     work.near.assign(world.pieces.size(), 0);
-    work.unseen.assign(world.pieces.size(), 0.0);
+    work.looked_at.assign(world.pieces.size(), 0.0);
     const OrganSurface surface = {rest.positions, rest.triangles, rest.topology, rest.component_roots, work.patches};
     for (std::size_t p = 0; p < world.pieces.size(); ++p) {
       prepare(work.detections[p], surface);
@@ -360,12 +365,9 @@ void place_instruments(StepContext& context, int substep, int substeps) {
   }
   for (std::size_t p = 0; p < context.world.pieces.size(); ++p) {
     const int instrument = context.world.pieces[p].instrument;
-    const double shift = (workspace.now[instrument].position - workspace.before[instrument].position).norm();
-    const double turn = angle_between(workspace.before[instrument], workspace.now[instrument]);
     Clearance& clearance = context.state.clearances[p];
-    clearance.shift += shift;
-    clearance.turn += turn;
-    context.work().unseen[p] += shift + turn * context.world.pieces[p].surface.reach;
+    clearance.shift += (workspace.now[instrument].position - workspace.before[instrument].position).norm();
+    clearance.turn += angle_between(workspace.before[instrument], workspace.now[instrument]);
   }
 }
 
@@ -373,14 +375,16 @@ bool looks_again(StepContext& context) {
   OrganWorkspace& work = context.work();
   const double limit = context.model().motion_limit;
   bool again = context.substep == 1 || context.jumps;
-  for (const double way : work.unseen) again = again || !(way <= unseen_way * limit);  // a NaN is looked at
+  for (std::size_t p = 0; p < work.looked_at.size(); ++p) {
+    again = again || !(travel_of(context, p) - work.looked_at[p] <= unseen_way * limit);  // a NaN is looked at
+  }
   if (!again) find_instrument_velocities(context);
   for (std::size_t i = 0; i < work.points.size() && !again; ++i) {
     const ContactPoint& point = work.points[i];
     const Vector3 carried = point.carried + context.dt * point.instrument_velocity;
     again = !((at_point(point, context.state.positions) - carried).norm() <= unseen_slip * limit);
   }
-  if (again) std::fill(work.unseen.begin(), work.unseen.end(), 0.0);
+  for (std::size_t p = 0; p < work.looked_at.size() && again; ++p) work.looked_at[p] = travel_of(context, p);
   return again;
 }
 

@@ -33,7 +33,7 @@ struct OrganWorkspace {
   std::vector<Detection> detections;      ///< per piece
   std::vector<Penetration> penetrations;  ///< per piece
   std::vector<char> near;                 ///< per piece: its box and the organ's overlap
-  std::vector<double> unseen;             ///< m, per piece: its way and the organ's since contact was looked for
+  std::vector<double> looked_at;          ///< m, per piece: what had been travelled when contact was looked for
   std::vector<ContactPoint> points;
   std::vector<int> bearers;  ///< of the points, ascending
   ElementRoom elements;
