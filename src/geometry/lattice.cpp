@@ -21,7 +21,10 @@ struct Path {
   std::array<double, 4> weights{};  ///< of the four corners along the path
 
   explicit Path(const Vector3& inside) {
-    std::stable_sort(axes.begin(), axes.end(), [&](int a, int b) { return inside[a] > inside[b]; });
+    // Equal ones stay in order. Not std::stable_sort, which takes room from the heap for each three.
+    if (inside[1] > inside[0]) std::swap(axes[0], axes[1]);
+    if (inside[2] > inside[axes[1]]) std::swap(axes[1], axes[2]);
+    if (inside[axes[1]] > inside[axes[0]]) std::swap(axes[0], axes[1]);
     const double first = inside[axes[0]];
     const double second = inside[axes[1]];
     const double third = inside[axes[2]];
@@ -91,26 +94,26 @@ struct Place {
   }
 };
 
-/// Calls visit(point) for points that share the tetrahedron's volume evenly: those of a cube, folded into one of its
-/// six tetrahedra.
-template <class Visit>
-int sample(const TetrahedralMesh& solid, const Tetrahedron& t, double spacing, Visit&& visit) {
-  const double longest = std::sqrt(
-      squared_longest_edge(solid.vertices[t[0]], solid.vertices[t[1]], solid.vertices[t[2]], solid.vertices[t[3]]));
-  const int across = std::max(1, static_cast<int>(std::ceil(longest / spacing)));
+/// Points that share a tetrahedron's volume evenly, as weights of its corners: those of a cube, `across` each way,
+/// folded into one of its six tetrahedra.
+std::vector<std::array<double, 4>> sample_weights(int across) {
+  std::vector<std::array<double, 4>> weights;
   for (int i = 0; i < across; ++i) {
     for (int j = 0; j < across; ++j) {
       for (int k = 0; k < across; ++k) {
         const Path folded(Vector3(i + 1.0 / 6.0, j + 3.0 / 6.0, k + 5.0 / 6.0) / across);  // no ties
-        Vector3 point = Vector3::Zero();
-        for (std::size_t corner = 0; corner < 4; ++corner) {
-          point += folded.weights[corner] * solid.vertices[t[corner]];
-        }
-        visit(point);
+        weights.push_back(folded.weights);
       }
     }
   }
-  return across * across * across;
+  return weights;
+}
+
+/// How many samples each way keep them no farther apart than `spacing`.
+std::size_t samples_each_way(const TetrahedralMesh& solid, const Tetrahedron& t, double spacing) {
+  const double longest = std::sqrt(
+      squared_longest_edge(solid.vertices[t[0]], solid.vertices[t[1]], solid.vertices[t[2]], solid.vertices[t[3]]));
+  return std::max<std::size_t>(1, static_cast<std::size_t>(std::ceil(longest / spacing)));
 }
 
 Grid grid_around(const std::vector<Vector3>& vertices, const std::vector<Vector3>& points, double edge) {
@@ -166,11 +169,18 @@ Lattice cover(const TetrahedralMesh& solid, const std::vector<Vector3>& points, 
   };
   const double whole = edge * edge * edge / 6.0;
   std::vector<int> held;
+  std::vector<std::vector<std::array<double, 4>>> samples;  // by how many each way
   for (const Tetrahedron& t : solid.tetrahedra) {
+    const std::size_t across = samples_each_way(solid, t, edge / samples_across);
+    if (samples.size() <= across) samples.resize(across + 1);
+    if (samples[across].empty()) samples[across] = sample_weights(static_cast<int>(across));
     held.clear();
-    const int samples =
-        sample(solid, t, edge / samples_across, [&](const Vector3& p) { held.push_back(tetrahedron_at(p)); });
-    const double share = tetrahedron_volume(solid, t) / (whole * samples);
+    for (const std::array<double, 4>& weights : samples[across]) {
+      Vector3 point = Vector3::Zero();
+      for (std::size_t corner = 0; corner < 4; ++corner) point += weights[corner] * solid.vertices[t[corner]];
+      held.push_back(tetrahedron_at(point));
+    }
+    const double share = tetrahedron_volume(solid, t) / (whole * static_cast<double>(held.size()));
     for (const int number : held) lattice.fill[number] += share;
   }
   for (double& fill : lattice.fill) fill = fill > counted_full ? 1.0 : fill;
