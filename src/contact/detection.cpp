@@ -63,7 +63,6 @@ void gather_pairs(const OrganSurface& organ, const InstrumentSurface& instrument
     const Vector3 middle = back * (0.5 * (box.lower + box.upper) - pose.position);
     if (is_clear(instrument, middle, 0.5 * box.size().norm() + clear_margin, d.free_balls[patch])) return;
     const auto points = static_cast<std::size_t>(vertices.end(patch) - vertices.begin(patch));
-    if (d.rounded.size() < points) d.rounded.resize(points);
     FloatPoint* rounded = d.rounded.data();
     for (const int* v = vertices.begin(patch); v != vertices.end(patch); ++v, ++rounded) {
       if (d.local_stamp[*v] != d.stamp) {
@@ -250,6 +249,13 @@ void prepare(Detection& d, const OrganSurface& organ) {
   d.crossed_edge_of.assign(edges, -1);
   d.nearest.assign(vertices, -1);
   d.free_balls.assign(organ.patches.leaf_of.size(), FreeBall());
+  std::size_t most_points = 0;
+  for (std::size_t patch = 0; patch < organ.patches.leaf_of.size(); ++patch) {
+    const auto list = static_cast<int>(patch);
+    const auto points = organ.patches.edge_vertices.end(list) - organ.patches.edge_vertices.begin(list);
+    most_points = std::max(most_points, static_cast<std::size_t>(points));
+  }
+  d.rounded.resize(most_points);
   d.edge_set.prepare(edges);
   d.vertex_set.prepare(vertices);
   d.outside_set.prepare(vertices);

@@ -246,6 +246,7 @@ void make_room(Detection& detection, Penetration& penetration) {
   detection.crossed_edges.reserve(usual_contacts);
   detection.unordered.reserve(usual_contacts);
   detection.pairs.reserve(usual_contacts);
+  detection.hits.reserve(usual_contacts);
   for (std::vector<int>* list :
        {&detection.border, &detection.border_outside, &detection.colliding, &detection.stack,
         &detection.tree_room.stack, &detection.tree_room.leaves, &penetration.layer, &penetration.next_layer}) {

@@ -4,8 +4,12 @@
 
 #include <cmath>
 
+#include "environment.h"
+#include "scene/obj_text.h"
 #include "simulation/test_scenes.h"
+#include "tissue_sim/geometry/primitives.h"
 #include "tissue_sim/simulation/timeline.h"
+#include "tissue_sim/study/temporary_folder.h"
 
 namespace tissue_sim {
 namespace {
@@ -289,6 +293,66 @@ TEST(AccuracyTable, TheShippedOneHasEveryModel) {
   for (const Model model : {Model::contact_only, Model::surface, Model::volume, Model::fem}) {
     EXPECT_TRUE(std::isfinite(expected_error(table, model, Integrator::explicit_substeps, 1.0))) << to_string(model);
   }
+}
+
+/// A small wall and ball, in files. `keys` are the scene's own, `of_organ` the organ's.
+std::string write_wall_scene(const TemporaryFolder& folder, const std::string& keys, const std::string& of_organ) {
+  folder.write("wall.obj", obj_of(make_sphere(50.0, 20), 9));
+  folder.write("ball.urdf",
+               "<robot name='b'><link name='tip'><collision><geometry><sphere radius='0.04'/></geometry></collision>"
+               "</link></robot>");
+  return folder.write("scene.yaml", "frame: world\n" + keys + "organs:\n  - name: wall\n    mesh: wall.obj\n" +
+                                        "    scale: 0.001\n    wall_thickness: 0.003\n" + of_organ +
+                                        "    material: {young: 5400, poisson: 0.45, density: 1060}\n    attachments:\n"
+                                        "      - sphere: {center: [0, 0, -0.05], radius: 0.01}\ninstruments:\n"
+                                        "  - {name: ball, urdf: ball.urdf, tip_link: tip, pose_topic: a/b}\n");
+}
+
+TEST(LoadChosenScene, TakesTheMostExactThatABudgetWithoutEndPays) {
+  const TemporaryFolder folder;
+  std::vector<std::string> warnings;
+  std::vector<ModelChoice> choices;
+  const Scene scene = load_chosen_scene(
+      write_wall_scene(folder, "time_step: 0.001\naccuracy: {budget_ms: 100000}\n", ""), warnings, choices);
+  EXPECT_EQ(scene.organs.at(0).model, Model::surface);
+  ASSERT_EQ(choices.size(), 1u);
+  EXPECT_EQ(choices[0].model, Model::surface);
+  EXPECT_GT(choices[0].measured, 0.0);
+  EXPECT_LT(choices[0].measured, 100.0);
+  ASSERT_EQ(choices[0].rejected.size(), 1u);
+  EXPECT_EQ(choices[0].rejected[0].find("contact_only: expected error 100 %, "), 0u) << choices[0].rejected[0];
+}
+
+TEST(LoadChosenScene, RejectsAModelThatTheTimeStepIsTooLongFor) {
+  const TemporaryFolder folder;
+  std::vector<std::string> warnings;
+  std::vector<ModelChoice> choices;
+  const Scene scene =
+      load_chosen_scene(write_wall_scene(folder, "time_step: 0.1\nmax_substeps: 1\naccuracy: {budget_ms: 100000}\n",
+                                         "    integrator: explicit\n"),
+                        warnings, choices);
+  EXPECT_EQ(scene.organs.at(0).model, Model::contact_only);
+  ASSERT_EQ(choices.size(), 1u);
+  ASSERT_EQ(choices[0].rejected.size(), 1u);
+  EXPECT_NE(choices[0].rejected[0].find("surface, auto: organ wall: a step of 0.1 s needs "), std::string::npos)
+      << choices[0].rejected[0];
+}
+
+TEST(LoadChosenScene, LeavesASceneThatNamesItsModelsAsItIs) {
+  const TemporaryFolder folder;
+  std::vector<std::string> warnings;
+  std::vector<ModelChoice> choices;
+  const Scene scene =
+      load_chosen_scene(write_wall_scene(folder, "time_step: 0.001\n", "    model: surface\n"), warnings, choices);
+  EXPECT_EQ(scene.organs.at(0).model, Model::surface);
+  EXPECT_TRUE(choices.empty());
+}
+
+TEST(AccuracyTable, IsFoundFromTheProgramWhereNoEnvironmentAndNoSceneLeadsToIt) {
+  const Environment packages("ROS_PACKAGE_PATH", "");
+  const Environment prefixes("CMAKE_PREFIX_PATH", "");
+  const AccuracyTable table = load_accuracy_table("/scene.yaml");
+  EXPECT_EQ(table.rows.size(), load_accuracy_table(source_file("config/scenes/dial.yaml")).rows.size());
 }
 
 }  // namespace

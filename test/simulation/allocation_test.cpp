@@ -112,6 +112,31 @@ TEST(Allocation, NoneInAWarmStep) {
   EXPECT_EQ(allocations_once_warm(DepthScheme::exact, CollidingSet::flood), 0u);
 }
 
+/// Lists that grow with the largest contact so far would grow once in hours.
+TEST(Allocation, NoneInTheFirstTouch) {
+  Simulation simulation(scene_of(wall_sphere(16), {ball(0.01)}));
+  const Pose away = {{0.062, 0.003, 0.002}, Eigen::Quaterniond::Identity()};
+  simulation.start_at(away);
+  Motion motion = {0.001, {{true, away, away}}};
+  std::size_t contacts = 0;
+  const auto press = [&](double speed) {  // mm a step
+    for (int i = 0; i < 100; ++i) {
+      motion.instruments[0].from = motion.instruments[0].to;
+      motion.instruments[0].to.position.x() -= 0.001 * speed;
+      ++simulation.report.step;
+      step(simulation.world, motion, simulation.state, simulation.workspace, simulation.report);
+      contacts = std::max(contacts, simulation.report.contacts.size());
+    }
+  };
+  press(0.0);
+  ASSERT_EQ(contacts, 0u);
+  const std::size_t before = counted_allocations();
+  press(0.25);
+  const std::size_t after = counted_allocations();
+  EXPECT_EQ(after - before, 0u);
+  EXPECT_GE(contacts, 3u);
+}
+
 TEST(Allocation, NoneInAWarmStepOfAPartOfAWall) {
   Organ organ = wall_sphere(32);
   organ.wall_thickness = 0.001;

@@ -7,6 +7,7 @@
 
 #include "floating_point_traps.h"
 #include "simulation/solid_scenes.h"
+#include "tissue_sim/simulation/timeline.h"
 
 namespace tissue_sim {
 namespace {
@@ -326,6 +327,33 @@ TEST(Levels, OfThreeSizesHoldTogether) {
             static_cast<double>(coarsest.positions.size());
   }
   EXPECT_LT(mean.norm(), 0.001) << "and has not been pushed away";
+}
+
+TEST(Levels, ATimelineTellsOfThemAndOfHowMuchIsAwake) {
+  Timeline timeline(block_scene(0.05));
+  const OrganSummary summary = timeline.summary(0);
+  ASSERT_GE(summary.levels.size(), 2u);
+  EXPECT_EQ(summary.levels[0].tetrahedra, summary.tetrahedra);
+  EXPECT_NEAR(summary.levels[0].edge, 0.01 / 3.0, 0.002);
+  for (std::size_t level = 1; level < summary.levels.size(); ++level) {
+    EXPECT_GT(summary.levels[level].edge, summary.levels[level - 1].edge);
+    EXPECT_LT(summary.levels[level].tetrahedra, summary.levels[level - 1].tetrahedra);
+    EXPECT_GT(summary.levels[level - 1].radius, 0.0);
+  }
+  EXPECT_EQ(summary.levels.back().radius, 0.0) << "all of the coarsest is awake";
+
+  EXPECT_EQ(timeline.active_vertices(), 0) << "it sleeps until it is touched";
+  constexpr std::int64_t start = 1'000'000'000, step = 1'000'000;  // ns
+  for (int i = 0; i <= 10; ++i) {
+    timeline.add_pose(0, {start + i * step, ball_at(0.0, 0.0005 * i)});
+    while (timeline.step()) {
+    }
+  }
+  EXPECT_FALSE(timeline.report().contacts.empty());
+  EXPECT_GT(timeline.active_vertices(), 0);
+  EXPECT_LT(timeline.active_vertices(), summary.simulated_vertices);
+  EXPECT_GT(timeline.kinetic_energy(), 0.0);
+  EXPECT_GT(timeline.elastic_energy(), 0.0);
 }
 
 }  // namespace

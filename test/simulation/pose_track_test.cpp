@@ -38,5 +38,19 @@ TEST(PoseQueue, IsADeque) {
   EXPECT_GT(longest, 100u);
 }
 
+/// Diagnostics and logs count poses under these words.
+TEST(PoseVerdict, HasAWordForEach) {
+  const std::pair<PoseVerdict, const char*> words[] = {{PoseVerdict::used, "used"},
+                                                       {PoseVerdict::zero_stamp, "zero stamp"},
+                                                       {PoseVerdict::non_finite, "non-finite"},
+                                                       {PoseVerdict::zero_quaternion, "zero quaternion"},
+                                                       {PoseVerdict::stale, "stale"},
+                                                       {PoseVerdict::new_run, "new run"},
+                                                       {PoseVerdict::late_stamp, "late stamp"},
+                                                       {PoseVerdict::too_far, "too far"}};
+  EXPECT_EQ(std::size(words), static_cast<std::size_t>(pose_verdicts));
+  for (const auto& [verdict, word] : words) EXPECT_STREQ(to_string(verdict), word);
+}
+
 }  // namespace
 }  // namespace tissue_sim
