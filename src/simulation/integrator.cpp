@@ -19,6 +19,17 @@ constexpr double covered_stiffening = 1.5;
 /// step with that, and in none with 1.0 or 0.7.
 constexpr double solid_stiffening = 0.7;
 
+/// 1/s^2, at most, of the element by itself.
+double squared_frequency(const RestShape& rest, const NeoHookeanElement& element,
+                         const std::vector<Vector3>& positions) {
+  const std::array<double, 4> stiffnesses = element.stiffnesses(gather(element, positions));
+  double fastest = 0.0;
+  for (std::size_t corner = 0; corner < 4; ++corner) {
+    fastest = std::max(fastest, stiffnesses[corner] * rest.inverse_mass[element.vertices[corner]]);
+  }
+  return fastest;
+}
+
 /// All vertices that are simulated, or those of a list.
 struct EveryVertex {
   std::size_t first;
@@ -251,14 +262,18 @@ double stiffening(const RestShape& rest, const FlatLists& tetrahedra_at, const s
   for (const int v : bearers) {
     if (v == std::exchange(before, v)) continue;
     for (const int* t = tetrahedra_at.begin(v); t != tetrahedra_at.end(v); ++t) {
-      const NeoHookeanElement& element = rest.tetrahedra[*t];
-      const std::array<double, 4> stiffnesses = element.stiffnesses(gather(element, positions));
-      for (std::size_t corner = 0; corner < 4; ++corner) {
-        stiffest = std::max(stiffest, stiffnesses[corner] * rest.inverse_mass[element.vertices[corner]]);
-      }
+      stiffest = std::max(stiffest, squared_frequency(rest, rest.tetrahedra[*t], positions));
     }
   }
   return stiffest / rest.stiffest_element;
+}
+
+double stiffening(const RestShape& rest, const std::vector<Vector3>& positions) {
+  double stiffest = 0.0;
+  for (const NeoHookeanElement& element : rest.tetrahedra) {
+    stiffest = std::max(stiffest, squared_frequency(rest, element, positions));
+  }
+  return rest.tetrahedra.empty() ? 0.0 : stiffest / rest.stiffest_element;
 }
 
 void element_forces(const RestShape& rest, const Moving& moving, std::vector<Vector3>& forces, ElementRoom& room,

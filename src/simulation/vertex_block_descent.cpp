@@ -97,6 +97,7 @@ class Descent {
         dt_(dt),
         inertia_((1.0 + dt * organ.drag) / (dt * dt)),
         damping_(organ.rest.damping_time / dt),
+        is_long_(dt * organ.rest.fastest_frequency > long_step),
         corner_sum_(corner_sum()),
         points_(points),
         state_(state),
@@ -104,14 +105,20 @@ class Descent {
 
   void start(const Vector3& gravity);
   void sweep();
-  double finish();
+  double finish(const Vector3& gravity);
 
  private:
   const RestShape& rest() const { return organ_.rest; }
   bool moves(int v) const { return rest().inverse_mass[v] > 0.0 && !state_.holds(static_cast<std::size_t>(v)); }
   double inertia(int v) const { return inertia_ * rest().mass[v]; }
   void place(int v, const Vector3& position);
+  double motion() const;
+  double work_of(const Vector3& gravity) const;
+  double elastic(const std::vector<Vector3>& positions) const {
+    return elastic_energy(rest(), positions, room_.scratch);
+  }
   double part_of_the_way(double slowed, const Vector3& gravity);
+  double part_of_the_speed(const Vector3& gravity);
   LocalStiffness of_tetrahedra(int v) const {
     if (room_.displacements.empty()) return {};
     return corner_sum_(organ_.incidence.tetrahedra, v, room_.displacements.data());
@@ -125,16 +132,23 @@ class Descent {
   const double dt_;
   const double inertia_;  ///< 1/s^2
   const double damping_;  ///< how much the damping adds to the tetrahedra's blocks
+  const bool is_long_;    ///< the step is: energies are looked at
   const CornerSum corner_sum_;
   std::vector<ContactPoint>& points_;
   OrganState& state_;
   DescentRoom& room_;
   double enclosed_ = 0.0;  ///< the enclosed volume's constraint, kept up with every vertex that moves
   double enclosed_at_start_ = 0.0;
+  double motion_at_start_ = 0.0;   ///< J, of long steps, as is
+  double elastic_at_start_ = 0.0;  ///< J
 };
 
 void Descent::start(const Vector3& gravity) {
   room_.start = state_.positions;
+  if (is_long_) {
+    motion_at_start_ = motion();
+    elastic_at_start_ = elastic(room_.start);
+  }
   measure_displacements(rest(), state_.positions, room_);
   if (rest().enclosed.stiffness > 0.0) {
     enclosed_at_start_ = rest().enclosed.evaluate(state_.positions, rest().wall_triangles(), room_.inertial);
@@ -177,22 +191,42 @@ void Descent::start(const Vector3& gravity) {
 /// has, what contacts and gravity give included, the step starts at the part of it that an exact step along it would
 /// go.
 double Descent::part_of_the_way(double slowed, const Vector3& gravity) {
-  if (!(dt_ * rest().fastest_frequency > long_step)) return 1.0;
-  double motion = 0.0;  // J
-  double work = 0.0;    // J, of gravity and of the contacts, as they pressed before
-  const int vertices = static_cast<int>(state_.positions.size());
-  for (int v = rest().first_simulated; v < vertices; ++v) {
-    if (!moves(v)) continue;
-    motion += 0.5 * rest().mass[v] * (slowed * state_.velocities[v]).squaredNorm();
-    work += rest().mass[v] * gravity.dot(state_.positions[v] - room_.start[v]);
-  }
+  if (!is_long_) return 1.0;
+  double work = work_of(gravity);  // J, and of the contacts, as they pressed before
   for (const ContactPoint& point : points_) {
     const Vector3 way = at_point(point, state_.positions) - at_point(point, room_.start);
     work += std::max(0.0, point.force * point.direction.dot(way));
   }
-  const double taken_up = elastic_energy(rest(), state_.positions, room_.scratch) -
-                          elastic_energy(rest(), room_.start, room_.scratch) - work;
+  const double motion = square(slowed) * motion_at_start_;
+  const double taken_up = elastic(state_.positions) - elastic_at_start_ - work;
   return taken_up > motion ? motion / (motion + taken_up) : 1.0;
+}
+
+/// What sweeps leave undone of a long step can leave more energy than there was: a block of 20 mm edges, E 6 kPa,
+/// nu 0.499, had five times as much after 3,000 steps alone. Where no instrument gives any, the motion pays.
+double Descent::part_of_the_speed(const Vector3& gravity) {
+  if (!is_long_ || !points_.empty()) return 1.0;
+  const double now = motion();
+  const double left = motion_at_start_ + elastic_at_start_ + work_of(gravity) - elastic(state_.positions);
+  return now > left ? std::sqrt(std::max(0.0, left) / now) : 1.0;
+}
+
+/// J.
+double Descent::motion() const {
+  double twice = 0.0;
+  for (std::size_t v = rest().first_simulated; v < state_.velocities.size(); ++v) {
+    if (moves(static_cast<int>(v))) twice += rest().mass[v] * state_.velocities[v].squaredNorm();
+  }
+  return 0.5 * twice;
+}
+
+/// J, since the start.
+double Descent::work_of(const Vector3& gravity) const {
+  double work = 0.0;
+  for (std::size_t v = rest().first_simulated; v < state_.positions.size(); ++v) {
+    if (moves(static_cast<int>(v))) work += rest().mass[v] * gravity.dot(state_.positions[v] - room_.start[v]);
+  }
+  return work;
 }
 
 void Descent::place(int v, const Vector3& position) {
@@ -277,7 +311,7 @@ void Descent::sweep() {
   }
 }
 
-double Descent::finish() {
+double Descent::finish(const Vector3& gravity) {
   double fastest = 0.0;
   const int vertices = static_cast<int>(state_.positions.size());
   for (int v = rest().first_simulated; v < vertices; ++v) {
@@ -286,7 +320,9 @@ double Descent::finish() {
     state_.velocities[v] = (state_.positions[v] - room_.start[v]) / dt_;
     fastest = std::max(fastest, state_.velocities[v].squaredNorm());
   }
-  return std::sqrt(fastest);
+  const double part = part_of_the_speed(gravity);
+  for (int v = rest().first_simulated; part < 1.0 && v < vertices; ++v) state_.velocities[v] *= part;
+  return part * std::sqrt(fastest);
 }
 
 /// What vertex v sees of all elements but the enclosed volume, without damping. Wants undamped displacements in the
@@ -340,7 +376,7 @@ double descend(const OrganModel& organ, const Vector3& gravity, double dt, std::
   descent.start(gravity);
   const int sweeps = std::max(1, static_cast<int>(std::ceil(dt / sweep_period - 1e-9)));
   for (int i = 0; i < sweeps; ++i) descent.sweep();
-  return descent.finish();
+  return descent.finish(gravity);
 }
 
 void bearing_forces(const OrganModel& organ, const std::vector<ContactPoint>& points, const OrganState& state,

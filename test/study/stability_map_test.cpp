@@ -62,6 +62,31 @@ TEST(StabilityMap, ARefusalNamesTheStepThatIsStable) {
   EXPECT_NE(rows[1].reason.find("max_substeps"), std::string::npos) << rows[1].reason;
 }
 
+/// What the whole map found: descent whose sweeps gave energy to an organ alone, and one that swung freely until its
+/// substeps were too long for it.
+TEST(StabilityMap, OrgansOfTwentyMillimetreEdgesThatHardlyYieldAreStable) {
+  StabilityCell soft = liver(0.001);
+  soft.integrator = Integrator::vertex_block_descent;
+  soft.young = 6e3;
+  soft.poisson = 0.499;
+  soft.edge = 0.02;
+  soft.damping = 0.0;
+  StabilityCell stiff = soft;
+  stiff.model = Model::volume;
+  stiff.young = 1e6;
+  stiff.damping = 0.1;
+  stiff.time_step = 0.0001;
+  StabilityCell swinging = soft;
+  swinging.integrator = Integrator::explicit_substeps;
+  swinging.time_step = 0.05;
+  const std::vector<StabilityRow> rows = map_stability({soft, stiff, swinging}, nullptr);
+  EXPECT_EQ(rows[0].outcome, Outcome::stable) << rows[0].reason;
+  EXPECT_LT(rows[0].energy_growth, 1.0);
+  EXPECT_EQ(rows[1].outcome, Outcome::stable) << rows[1].reason;
+  EXPECT_LT(rows[1].energy_growth, 1.0);
+  EXPECT_EQ(rows[2].outcome, Outcome::other_step) << rows[2].reason;
+}
+
 /// It must not call everything good: a step beyond what a scene file may ask for is refused without one that would do.
 TEST(StabilityMap, NamesWhatIsNeither) {
   const std::vector<StabilityRow> rows = map_stability({liver(0.2)}, nullptr);

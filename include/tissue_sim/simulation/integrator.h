@@ -20,6 +20,9 @@ constexpr double most_stiffening = 11.2;
 double stiffening(const RestShape& rest, const FlatLists& tetrahedra_at, const std::vector<ContactPoint>& points,
                   const std::vector<Vector3>& positions, std::vector<int>& bearers);
 
+/// The same of all tetrahedra, wherever they are: an organ that swings freely and far stiffens too.
+double stiffening(const RestShape& rest, const std::vector<Vector3>& positions);
+
 /// Packs the elements into the batches that element_forces() computes.
 void pack_elements(RestShape& rest);
 
