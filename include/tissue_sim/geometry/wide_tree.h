@@ -10,11 +10,11 @@
 
 namespace tissue_sim {
 
-/// A point in single precision, rounded; the fourth number is nothing.
-using FloatPoint = std::array<float, 4>;
+/// A point in single precision, rounded; the fourth number is nothing. Read and written as one register, wherever it is.
+struct alignas(16) FloatPoint : std::array<float, 4> {};
 
 inline FloatPoint to_float(const Vector3& p) {
-  return {static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()), 0.0F};
+  return {{static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()), 0.0F}};
 }
 
 /// A tree with eight children a node over the triangles of a mesh that never moves. In single precision: rounding keeps
