@@ -20,10 +20,7 @@ double energy_of(const std::vector<Kind>& elements, const std::vector<Vector3>& 
 double elastic_energy(const RestShape& rest, const std::vector<Vector3>& positions, std::vector<Vector3>& room) {
   double energy = energy_of(rest.distances, positions) + energy_of(rest.areas, positions);
   energy += energy_of(rest.volumes, positions);
-  NeoHookeanElement::Vectors forces;
-  for (const NeoHookeanElement& element : rest.tetrahedra) {
-    energy += element.evaluate(gather(element, positions), forces);
-  }
+  for (const NeoHookeanElement& element : rest.tetrahedra) energy += element.energy(gather(element, positions));
   if (rest.enclosed.stiffness > 0.0) {
     const double c = rest.enclosed.evaluate(positions, rest.wall_triangles(), room);
     energy += 0.5 * rest.enclosed.stiffness * c * c;

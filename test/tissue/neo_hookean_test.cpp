@@ -175,6 +175,7 @@ TEST_F(NeoHookean, TurningTheStateTurnsTheForces) {
   Vectors gradient;
   Vectors turned;
   const double energy = element.evaluate(x, gradient);
+  EXPECT_EQ(element.energy(x), energy);
   EXPECT_NEAR(element.evaluate(moved(x, turn, random_vector(0.01)), turned), energy, 1e-10 * energy);
   for (std::size_t i = 0; i < 4; ++i) EXPECT_LT((turned[i] - turn * gradient[i]).norm(), 1e-10 * largest(gradient));
 }

@@ -85,6 +85,16 @@ struct NeoHookeanElement {
     const Matrix3 pull = volume * stress * inverse_rest.transpose();
     for (int i = 0; i < 3; ++i) gradient[static_cast<std::size_t>(i) + 1] = pull.col(i);
     gradient[0] = -(pull.col(0) + pull.col(1) + pull.col(2));
+    return energy(f, stretch);
+  }
+
+  /// J, as evaluate(), in a third of the time.
+  double energy(const Vectors& x) const {
+    const Matrix3 f = deformation_gradient(x);
+    return energy(f, f.col(0).dot(f.col(1).cross(f.col(2))) - 1.0);
+  }
+  double energy(const Matrix3& f, double stretch) const {
+    const double stiff = moduli.lambda + moduli.mu;
     return volume * (0.5 * moduli.mu * (f.squaredNorm() - 3.0) - moduli.mu * stretch + 0.5 * stiff * stretch * stretch);
   }
 
