@@ -98,13 +98,13 @@ struct Hold {
 /// took longer than the work.
 class OneThread {
  public:
-  OneThread() : before(omp_get_max_active_levels()) { omp_set_max_active_levels(0); }
-  ~OneThread() { omp_set_max_active_levels(before); }
+  OneThread() : before_(omp_get_max_active_levels()) { omp_set_max_active_levels(0); }
+  ~OneThread() { omp_set_max_active_levels(before_); }
   OneThread(const OneThread&) = delete;
   OneThread& operator=(const OneThread&) = delete;
 
  private:
-  int before;
+  int before_;
 };
 
 class Solver {
@@ -127,32 +127,32 @@ class Solver {
   void fill_matrix(Eigen::VectorXd& right);
   Vectors moved(const Vectors& step, double part, double load) const;
 
-  const ReferenceProblem& problem;
-  const ReferenceOptions& options;
-  int count;
-  double length = 0.0;    ///< m, of the solid's box
-  double rounding = 0.0;  ///< J, of the energy
-  double faintest = 0.0;  ///< N, the least reaction
-  std::vector<NeoHookeanElement> elements;
-  std::vector<std::array<bool, 3>> fixed;
-  Vectors prescribed;
-  Vectors forces;
-  std::vector<int> surface;
-  BlockMatrix blocks;
-  SparseMatrix matrix;
-  Eigen::CholmodSupernodalLLT<SparseMatrix, Eigen::Lower> factor;
+  const ReferenceProblem& problem_;
+  const ReferenceOptions& options_;
+  int count_;
+  double length_ = 0.0;    ///< m, of the solid's box
+  double rounding_ = 0.0;  ///< J, of the energy
+  double faintest_ = 0.0;  ///< N, the least reaction
+  std::vector<NeoHookeanElement> elements_;
+  std::vector<std::array<bool, 3>> fixed_;
+  Vectors prescribed_;
+  Vectors forces_;
+  std::vector<int> surface_;
+  BlockMatrix blocks_;
+  SparseMatrix matrix_;
+  Eigen::CholmodSupernodalLLT<SparseMatrix, Eigen::Lower> factor_;
 
-  Vectors x;
-  std::vector<Hold> holds;
-  std::vector<char> touching;
-  std::vector<int> releases;          ///< of a vertex, in this load step
-  std::vector<ObstaclePoint> points;  ///< of the touching vertices
-  std::vector<double> pushes;         ///< N, of the obstacle on them
-  bool changed = false;               ///< the active set, in this iteration
-  double left_over = 0.0;             ///< N
-  double reaction = 0.0;              ///< N
-  bool careful = false;               ///< there is a smaller load step to try
-  int iterations = 0;
+  Vectors x_;
+  std::vector<Hold> holds_;
+  std::vector<char> touching_;
+  std::vector<int> releases_;          ///< of a vertex, in this load step
+  std::vector<ObstaclePoint> points_;  ///< of the touching vertices
+  std::vector<double> pushes_;         ///< N, of the obstacle on them
+  bool changed_ = false;               ///< the active set, in this iteration
+  double left_over_ = 0.0;             ///< N
+  double reaction_ = 0.0;              ///< N
+  bool careful_ = false;               ///< there is a smaller load step to try
+  int iterations_ = 0;
 };
 
 std::size_t at(int index) {
@@ -166,94 +166,94 @@ void check_size(std::size_t size, std::size_t expected, const char* name) {
 }
 
 Solver::Solver(const ReferenceProblem& given, const ReferenceOptions& given_options)
-    : problem(given), options(given_options), count(static_cast<int>(given.mesh.vertices.size())) {
-  const std::vector<Tetrahedron>& tetrahedra = problem.mesh.tetrahedra;
-  const std::size_t n = at(count);
-  if (problem.moduli.size() != 1 && problem.moduli.size() != tetrahedra.size()) {
+    : problem_(given), options_(given_options), count_(static_cast<int>(given.mesh.vertices.size())) {
+  const std::vector<Tetrahedron>& tetrahedra = problem_.mesh.tetrahedra;
+  const std::size_t n = at(count_);
+  if (problem_.moduli.size() != 1 && problem_.moduli.size() != tetrahedra.size()) {
     throw std::invalid_argument("ReferenceProblem: moduli: expected one for all or one a tetrahedron");
   }
-  check_size(problem.fixed.size(), n, "fixed");
-  check_size(problem.prescribed.size(), n, "prescribed");
-  check_size(problem.forces.size(), n, "forces");
-  check_size(options.start.size(), n, "start");
-  if (options.load_steps < 1) throw std::invalid_argument("ReferenceOptions: load_steps: expected 1 or more");
-  fixed = problem.fixed;
-  fixed.resize(n);
-  prescribed = problem.prescribed;
-  prescribed.resize(n, Vector3::Zero());
-  forces = problem.forces;
-  forces.resize(n, Vector3::Zero());
+  check_size(problem_.fixed.size(), n, "fixed");
+  check_size(problem_.prescribed.size(), n, "prescribed");
+  check_size(problem_.forces.size(), n, "forces");
+  check_size(options_.start.size(), n, "start");
+  if (options_.load_steps < 1) throw std::invalid_argument("ReferenceOptions: load_steps: expected 1 or more");
+  fixed_ = problem_.fixed;
+  fixed_.resize(n);
+  prescribed_ = problem_.prescribed;
+  prescribed_.resize(n, Vector3::Zero());
+  forces_ = problem_.forces;
+  forces_.resize(n, Vector3::Zero());
 
   std::vector<char> used(n, 0);
   for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
     NeoHookeanElement::Vectors corners;
     for (std::size_t i = 0; i < 4; ++i) {
-      corners[i] = problem.mesh.vertices[at(tetrahedra[t][i])];
+      corners[i] = problem_.mesh.vertices[at(tetrahedra[t][i])];
       used[at(tetrahedra[t][i])] = 1;
     }
-    elements.push_back(
-        NeoHookeanElement::at_rest(tetrahedra[t], corners, problem.moduli[problem.moduli.size() == 1 ? 0 : t]));
-    rounding += energy_rounding * elements.back().volume * elements.back().moduli.mu;
-    if (!(elements.back().volume > 0.0)) {
+    elements_.push_back(
+        NeoHookeanElement::at_rest(tetrahedra[t], corners, problem_.moduli[problem_.moduli.size() == 1 ? 0 : t]));
+    rounding_ += energy_rounding * elements_.back().volume * elements_.back().moduli.mu;
+    if (!(elements_.back().volume > 0.0)) {
       throw std::invalid_argument("ReferenceProblem: tetrahedron " + std::to_string(t) + " has no volume");
     }
   }
   Eigen::AlignedBox3d box;
   for (std::size_t v = 0; v < n; ++v) {
-    if (used[v] == 0) fixed[v] = {true, true, true};  // nothing would hold it
-    box.extend(problem.mesh.vertices[v]);
+    if (used[v] == 0) fixed_[v] = {true, true, true};  // nothing would hold it
+    box.extend(problem_.mesh.vertices[v]);
   }
-  length = box.isEmpty() ? 0.0 : box.diagonal().norm();
-  for (const NeoHookeanElement& element : elements) {
-    faintest = std::max(faintest, least_reaction * element.moduli.mu * length * length);
+  length_ = box.isEmpty() ? 0.0 : box.diagonal().norm();
+  for (const NeoHookeanElement& element : elements_) {
+    faintest_ = std::max(faintest_, least_reaction * element.moduli.mu * length_ * length_);
   }
-  if (problem.obstacle) {
-    for (const int v : problem.surface) {
-      if (v < 0 || v >= count) {
+  if (problem_.obstacle) {
+    for (const int v : problem_.surface) {
+      if (v < 0 || v >= count_) {
         throw std::invalid_argument("ReferenceProblem: surface names vertex " + std::to_string(v) + " of " +
-                                    std::to_string(count));
+                                    std::to_string(count_));
       }
-      if (!(fixed[at(v)][0] && fixed[at(v)][1] && fixed[at(v)][2])) surface.push_back(v);
+      if (!(fixed_[at(v)][0] && fixed_[at(v)][1] && fixed_[at(v)][2])) surface_.push_back(v);
     }
   }
-  x = options.start.empty() ? problem.mesh.vertices : options.start;
-  holds.resize(n);
-  touching.assign(n, 0);
-  releases.assign(n, 0);
-  points.resize(n);
-  pushes.assign(n, 0.0);
-  blocks = build_blocks(count, tetrahedra);
-  matrix = build_pattern(blocks);
-  factor.cholmod().print = 0;  // a matrix that is not positive definite is expected, and met with a shift
-  factor.analyzePattern(matrix);
+  x_ = options_.start.empty() ? problem_.mesh.vertices : options_.start;
+  holds_.resize(n);
+  touching_.assign(n, 0);
+  releases_.assign(n, 0);
+  points_.resize(n);
+  pushes_.assign(n, 0.0);
+  blocks_ = build_blocks(count_, tetrahedra);
+  matrix_ = build_pattern(blocks_);
+  factor_.cholmod().print = 0;  // a matrix that is not positive definite is expected, and met with a shift
+  factor_.analyzePattern(matrix_);
 }
 
 /// Energy in J of the solid and its loads, and its gradient in N.
 double Solver::evaluate(const Vectors& positions, double load, Vectors& gradient) const {
   double energy = 0.0;
-  gradient.assign(at(count), Vector3::Zero());
-  for (const NeoHookeanElement& element : elements) {
+  gradient.assign(at(count_), Vector3::Zero());
+  for (const NeoHookeanElement& element : elements_) {
     NeoHookeanElement::Vectors corners;
     NeoHookeanElement::Vectors pull;
     for (std::size_t i = 0; i < 4; ++i) corners[i] = positions[at(element.vertices[i])];
     energy += element.evaluate(corners, pull);
     for (std::size_t i = 0; i < 4; ++i) gradient[at(element.vertices[i])] += pull[i];
   }
-  for (std::size_t v = 0; v < at(count); ++v) {
-    energy -= load * forces[v].dot(positions[v] - problem.mesh.vertices[v]);
-    gradient[v] -= load * forces[v];
+  for (std::size_t v = 0; v < at(count_); ++v) {
+    energy -= load * forces_[v].dot(positions[v] - problem_.mesh.vertices[v]);
+    gradient[v] -= load * forces_[v];
   }
   return energy;
 }
 
 ObstaclePoint Solver::obstacle_at(const Vector3& position, double load) const {
-  return problem.obstacle(position + (1.0 - load) * problem.approach);
+  return problem_.obstacle(position + (1.0 - load) * problem_.approach);
 }
 
 Vector3 Solver::along_free(int vertex, const Vector3& direction) const {
   Vector3 result = direction;
   for (int axis = 0; axis < 3; ++axis) {
-    if (fixed[at(vertex)][at(axis)]) result[axis] = 0.0;
+    if (fixed_[at(vertex)][at(axis)]) result[axis] = 0.0;
   }
   return result;
 }
@@ -261,24 +261,24 @@ Vector3 Solver::along_free(int vertex, const Vector3& direction) const {
 Hold Solver::hold(int vertex, double load) const {
   const std::size_t v = at(vertex);
   Hold result;
-  result.held = fixed[v];
-  const Vector3 goal = problem.mesh.vertices[v] + load * prescribed[v];
+  result.held = fixed_[v];
+  const Vector3 goal = problem_.mesh.vertices[v] + load * prescribed_[v];
   int first_free = -1;
   int fixed_axis = -1;
   int free_axes = 0;
   for (int axis = 0; axis < 3; ++axis) {
-    if (fixed[v][at(axis)]) {
-      result.way[axis] = goal[axis] - x[v][axis];
+    if (fixed_[v][at(axis)]) {
+      result.way[axis] = goal[axis] - x_[v][axis];
       fixed_axis = axis;
     } else {
       if (first_free < 0) first_free = axis;
       ++free_axes;
     }
   }
-  if (touching[v] == 0) return result;
-  const Vector3 push = along_free(vertex, points[v].direction);
+  if (touching_[v] == 0) return result;
+  const Vector3 push = along_free(vertex, points_[v].direction);
   const Vector3 normal = push.normalized();
-  const double way = points[v].depth / push.norm();
+  const double way = points_[v].depth / push.norm();
   if (free_axes == 1) {
     result.held = {true, true, true};
     result.way[first_free] = way * normal[first_free];
@@ -294,43 +294,43 @@ Hold Solver::hold(int vertex, double load) const {
 
 /// Takes into the active set what is inside the obstacle.
 void Solver::touch(double load) {
-  for (const int vertex : surface) {
+  for (const int vertex : surface_) {
     const std::size_t v = at(vertex);
-    const ObstaclePoint point = obstacle_at(x[v], load);
-    if (touching[v] == 0) {
-      if (!(point.depth > length_rounding * length)) continue;
+    const ObstaclePoint point = obstacle_at(x_[v], load);
+    if (touching_[v] == 0) {
+      if (!(point.depth > length_rounding * length_)) continue;
       if (!(along_free(vertex, point.direction).norm() > grazing)) continue;
-      touching[v] = 1;
-      changed = true;
+      touching_[v] = 1;
+      changed_ = true;
     }
-    points[v] = point;
+    points_[v] = point;
   }
 }
 
 /// Lets go what the obstacle would have to pull.
 void Solver::let_go(double load, const Vectors& gradient) {
-  const double slack = options.tolerance * reaction;
+  const double slack = options_.tolerance * reaction_;
   int worst = -1;
-  for (const int vertex : surface) {
+  for (const int vertex : surface_) {
     const std::size_t v = at(vertex);
-    const bool there = points[v].depth <= length_rounding * length;  // before that its push says nothing
-    if (touching[v] == 0 || !there || !(pushes[v] < -slack)) continue;
-    if (releases[v] < free_changes) {
-      ++releases[v];
-      touching[v] = 0;
-      changed = true;
-    } else if (worst < 0 || pushes[v] < pushes[at(worst)]) {
+    const bool there = points_[v].depth <= length_rounding * length_;  // before that its push says nothing
+    if (touching_[v] == 0 || !there || !(pushes_[v] < -slack)) continue;
+    if (releases_[v] < free_changes) {
+      ++releases_[v];
+      touching_[v] = 0;
+      changed_ = true;
+    } else if (worst < 0 || pushes_[v] < pushes_[at(worst)]) {
       worst = vertex;
     }
   }
   // The others go one at a time, each from an equilibrium: so the energy falls from one to the next, and no set of
   // touching vertices comes again.
-  if (worst >= 0 && !changed && left_over <= options.tolerance * reaction) {
-    touching[at(worst)] = 0;
-    changed = true;
+  if (worst >= 0 && !changed_ && left_over_ <= options_.tolerance * reaction_) {
+    touching_[at(worst)] = 0;
+    changed_ = true;
   }
-  if (!changed) return;
-  for (const int vertex : surface) holds[at(vertex)] = hold(vertex, load);
+  if (!changed_) return;
+  for (const int vertex : surface_) holds_[at(vertex)] = hold(vertex, load);
   measure(gradient);
 }
 
@@ -338,34 +338,34 @@ void Solver::let_go(double load, const Vectors& gradient) {
 void Solver::measure(const Vectors& gradient) {
   double left = 0.0;
   double held = 0.0;
-  for (std::size_t v = 0; v < at(count); ++v) {
-    const Vector3 local = holds[v].frame.transpose() * gradient[v];
-    for (int a = 0; a < 3; ++a) (holds[v].held[at(a)] ? held : left) += local[a] * local[a];
-    if (touching[v] == 0) continue;
-    const Vector3 push = along_free(static_cast<int>(v), points[v].direction);
-    pushes[v] = push.dot(gradient[v]) / push.squaredNorm();
+  for (std::size_t v = 0; v < at(count_); ++v) {
+    const Vector3 local = holds_[v].frame.transpose() * gradient[v];
+    for (int a = 0; a < 3; ++a) (holds_[v].held[at(a)] ? held : left) += local[a] * local[a];
+    if (touching_[v] == 0) continue;
+    const Vector3 push = along_free(static_cast<int>(v), points_[v].direction);
+    pushes_[v] = push.dot(gradient[v]) / push.squaredNorm();
   }
-  left_over = std::sqrt(left);
-  reaction = std::max(std::sqrt(held), faintest);
+  left_over_ = std::sqrt(left);
+  reaction_ = std::max(std::sqrt(held), faintest_);
 }
 
 void Solver::fill_blocks() {
-  for (Matrix3& block : blocks.blocks) block.setZero();
-  for (std::size_t t = 0; t < elements.size(); ++t) {
-    const NeoHookeanElement& element = elements[t];
+  for (Matrix3& block : blocks_.blocks) block.setZero();
+  for (std::size_t t = 0; t < elements_.size(); ++t) {
+    const NeoHookeanElement& element = elements_[t];
     NeoHookeanElement::Vectors corners;
-    for (std::size_t i = 0; i < 4; ++i) corners[i] = x[at(element.vertices[i])];
+    for (std::size_t i = 0; i < 4; ++i) corners[i] = x_[at(element.vertices[i])];
     for (std::size_t pair = 0; pair < corner_pairs.size(); ++pair) {
       const auto [i, j] = corner_pairs[pair];
       const bool lower = element.vertices[i] >= element.vertices[j];
-      blocks.blocks[at(blocks.elements[t][pair])] +=
+      blocks_.blocks[at(blocks_.elements[t][pair])] +=
           lower ? element.block(corners, i, j) : element.block(corners, j, i);
     }
   }
   // On a curved obstacle the push turns as its vertex slides.
-  for (const int vertex : surface) {
+  for (const int vertex : surface_) {
     const std::size_t v = at(vertex);
-    if (touching[v] != 0) blocks.blocks[at(blocks.columns.first[v])] -= pushes[v] * points[v].turn;
+    if (touching_[v] != 0) blocks_.blocks[at(blocks_.columns.first[v])] -= pushes_[v] * points_[v].turn;
   }
 }
 
@@ -373,17 +373,17 @@ void Solver::fill_blocks() {
 /// that on the right-hand side.
 void Solver::fill_matrix(Eigen::VectorXd& right) {
   double trace = 0.0;
-  for (int v = 0; v < count; ++v) trace += blocks.blocks[at(blocks.columns.first[at(v)])].trace();
-  const double diagonal = trace / (3.0 * count);
-  double* values = matrix.valuePtr();
-  const int* starts = matrix.outerIndexPtr();
-  for (int column = 0; column < count; ++column) {
-    const Hold& from = holds[at(column)];
+  for (int v = 0; v < count_; ++v) trace += blocks_.blocks[at(blocks_.columns.first[at(v)])].trace();
+  const double diagonal = trace / (3.0 * count_);
+  double* values = matrix_.valuePtr();
+  const int* starts = matrix_.outerIndexPtr();
+  for (int column = 0; column < count_; ++column) {
+    const Hold& from = holds_[at(column)];
     int below = 0;  // rows of this column's blocks so far
-    for (const int* row = blocks.columns.begin(column); row != blocks.columns.end(column); ++row) {
-      const Hold& to = holds[at(*row)];
+    for (const int* row = blocks_.columns.begin(column); row != blocks_.columns.end(column); ++row) {
+      const Hold& to = holds_[at(*row)];
       const Matrix3 local =
-          to.frame.transpose() * blocks.blocks[at(static_cast<int>(row - blocks.columns.items.data()))] * from.frame;
+          to.frame.transpose() * blocks_.blocks[at(static_cast<int>(row - blocks_.columns.items.data()))] * from.frame;
       const bool own = *row == column;
       for (int b = 0; b < 3; ++b) {
         for (int a = own ? b : 0; a < 3; ++a) {
@@ -411,12 +411,12 @@ void Solver::fill_matrix(Eigen::VectorXd& right) {
 bool Solver::factorise(Eigen::VectorXd& right) {
   fill_blocks();
   fill_matrix(right);
-  const double mean = matrix.diagonal().sum() / static_cast<double>(matrix.rows());
+  const double mean = matrix_.diagonal().sum() / static_cast<double>(matrix_.rows());
   double shift = 0.0;
   for (int attempt = 0; attempt < 12; ++attempt) {
-    factor.setShift(shift);
-    factor.factorize(matrix);
-    if (factor.info() == Eigen::Success) return true;
+    factor_.setShift(shift);
+    factor_.factorize(matrix_);
+    if (factor_.info() == Eigen::Success) return true;
     shift = shift > 0.0 ? 10.0 * shift : 1e-6 * mean;
   }
   return false;
@@ -424,19 +424,19 @@ bool Solver::factorise(Eigen::VectorXd& right) {
 
 /// `part` of a step, with what is held where it belongs.
 Vectors Solver::moved(const Vectors& step, double part, double load) const {
-  Vectors result(x.size());
-  for (std::size_t v = 0; v < x.size(); ++v) {
-    result[v] = x[v] + part * step[v];
+  Vectors result(x_.size());
+  for (std::size_t v = 0; v < x_.size(); ++v) {
+    result[v] = x_[v] + part * step[v];
     for (int axis = 0; axis < 3; ++axis) {
-      if (fixed[v][at(axis)]) result[v][axis] = problem.mesh.vertices[v][axis] + load * prescribed[v][axis];
+      if (fixed_[v][at(axis)]) result[v][axis] = problem_.mesh.vertices[v][axis] + load * prescribed_[v][axis];
     }
-    if (touching[v] == 0) continue;
+    if (touching_[v] == 0) continue;
     for (int pass = 0; pass < 8; ++pass) {
       const ObstaclePoint point = obstacle_at(result[v], load);
       const Vector3 push = along_free(static_cast<int>(v), point.direction);
       if (!(push.norm() > grazing)) break;
       result[v] += point.depth / push.squaredNorm() * push;
-      if (std::abs(point.depth) <= 0.01 * length_rounding * length) break;
+      if (std::abs(point.depth) <= 0.01 * length_rounding * length_) break;
     }
   }
   return result;
@@ -444,7 +444,7 @@ Vectors Solver::moved(const Vectors& step, double part, double load) const {
 
 int Solver::inverted(const Vectors& positions) const {
   int result = 0;
-  for (const Tetrahedron& t : problem.mesh.tetrahedra) {
+  for (const Tetrahedron& t : problem_.mesh.tetrahedra) {
     const double volume =
         tetrahedron_volume(positions[at(t[0])], positions[at(t[1])], positions[at(t[2])], positions[at(t[3])]);
     if (!(volume > 0.0)) ++result;
@@ -454,97 +454,97 @@ int Solver::inverted(const Vectors& positions) const {
 
 /// Newton at one load, from where the last one ended.
 bool Solver::settle(double load, double tolerance) {
-  std::fill(releases.begin(), releases.end(), 0);
+  std::fill(releases_.begin(), releases_.end(), 0);
   Vectors gradient;
   Vectors trial_gradient;
-  Vectors step(at(count));
-  Eigen::VectorXd right(3 * count);
+  Vectors step(at(count_));
+  Eigen::VectorXd right(3 * count_);
   double least = 0.0;  // N, left over since the active set last changed
   int idle = 0;        // iterations since then that did not halve it
   for (int iteration = 0;; ++iteration) {
-    changed = false;
-    const double energy = evaluate(x, load, gradient);
+    changed_ = false;
+    const double energy = evaluate(x_, load, gradient);
     touch(load);
-    for (int v = 0; v < count; ++v) holds[at(v)] = hold(v, load);
+    for (int v = 0; v < count_; ++v) holds_[at(v)] = hold(v, load);
     measure(gradient);
     let_go(load, gradient);
     double way = 0.0;
-    for (std::size_t v = 0; v < at(count); ++v) {
+    for (std::size_t v = 0; v < at(count_); ++v) {
       for (int a = 0; a < 3; ++a) {
-        if (holds[v].held[at(a)]) way = std::max(way, std::abs(holds[v].way[a]));
+        if (holds_[v].held[at(a)]) way = std::max(way, std::abs(holds_[v].way[a]));
       }
     }
-    const bool there = way <= length_rounding * length;
-    if (there && !changed && left_over <= tolerance * reaction) return true;
-    if (changed || !there || left_over < 0.5 * least) {
-      least = left_over;
+    const bool there = way <= length_rounding * length_;
+    if (there && !changed_ && left_over_ <= tolerance * reaction_) return true;
+    if (changed_ || !there || left_over_ < 0.5 * least) {
+      least = left_over_;
       idle = 0;
     } else if (++idle == patience) {
-      careful = false;
+      careful_ = false;
       return false;
     }
-    if (iteration == options.max_iterations || !std::isfinite(energy)) return false;
+    if (iteration == options_.max_iterations || !std::isfinite(energy)) return false;
 
-    for (int v = 0; v < count; ++v) right.segment<3>(3 * v) = -(holds[at(v)].frame.transpose() * gradient[at(v)]);
+    for (int v = 0; v < count_; ++v) right.segment<3>(3 * v) = -(holds_[at(v)].frame.transpose() * gradient[at(v)]);
     if (!factorise(right)) return false;
-    const Eigen::VectorXd solved = factor.solve(right);
+    const Eigen::VectorXd solved = factor_.solve(right);
     double slope = 0.0;
-    for (int v = 0; v < count; ++v) {
-      step[at(v)] = holds[at(v)].frame * solved.segment<3>(3 * v);
+    for (int v = 0; v < count_; ++v) {
+      step[at(v)] = holds_[at(v)].frame * solved.segment<3>(3 * v);
       slope += gradient[at(v)].dot(step[at(v)]);
     }
-    ++iterations;
+    ++iterations_;
     // Where something has yet to go to its place the energy has to rise: such a step is taken whole.
     Vectors trial = moved(step, 1.0, load);
-    if (!there && careful && inverted(trial) > inverted(x)) return false;
+    if (!there && careful_ && inverted(trial) > inverted(x_)) return false;
     double part = 1.0;
     for (int halving = 0; there && halving < halvings; ++halving) {
       const double trial_energy = evaluate(trial, load, trial_gradient);
-      if (trial_energy <= energy + armijo * part * slope + rounding) break;
+      if (trial_energy <= energy + armijo * part * slope + rounding_) break;
       part *= 0.5;
       trial = moved(step, part, load);
     }
-    x = trial;
+    x_ = trial;
   }
 }
 
 ReferenceSolution Solver::solve() {
   ReferenceSolution result;
-  if (!options.start.empty()) {
-    for (const int vertex : surface) {
-      const ObstaclePoint point = obstacle_at(x[at(vertex)], 1.0 / options.load_steps);
+  if (!options_.start.empty()) {
+    for (const int vertex : surface_) {
+      const ObstaclePoint point = obstacle_at(x_[at(vertex)], 1.0 / options_.load_steps);
       const bool pushable = along_free(vertex, point.direction).norm() > grazing;
-      if (pushable && point.depth > -near * length) touching[at(vertex)] = 1;
+      if (pushable && point.depth > -near * length_) touching_[at(vertex)] = 1;
     }
   }
-  double part = 1.0 / options.load_steps;
+  double part = 1.0 / options_.load_steps;
   const double smallest = smallest_step * part;
   for (double done = 0.0; done < 1.0;) {
     const bool last = done + part > 1.0 - smallest;
     const double load = last ? 1.0 : done + part;
-    const Vectors before = x;
-    const std::vector<char> touching_before = touching;
-    careful = part > smallest;
-    result.converged = settle(load, last ? options.tolerance : std::max(loose, options.tolerance));
-    if (result.converged || !careful) {
+    const Vectors before = x_;
+    const std::vector<char> touching_before = touching_;
+    careful_ = part > smallest;
+    result.converged = settle(load, last ? options_.tolerance : std::max(loose, options_.tolerance));
+    if (result.converged || !careful_) {
       done = load;
       continue;
     }
-    x = before;
-    touching = touching_before;
+    x_ = before;
+    touching_ = touching_before;
     part *= 0.5;
   }
-  result.positions = x;
+  result.positions = x_;
   Vectors gradient;
-  evaluate(x, 1.0, gradient);
-  for (std::size_t v = 0; v < at(count); ++v) {
-    result.internal_forces.push_back(-gradient[v] - forces[v]);
-    if (touching[v] == 0) continue;
+  evaluate(x_, 1.0, gradient);
+  for (std::size_t v = 0; v < at(count_); ++v) {
+    result.internal_forces.push_back(-gradient[v] - forces_[v]);
+    if (touching_[v] == 0) continue;
     result.contacts.push_back(static_cast<int>(v));
-    result.contact_force -= pushes[v] * points[v].direction;
+    result.contact_force -= pushes_[v] * points_[v].direction;
   }
-  result.iterations = iterations;
-  result.residual = left_over / reaction;
+  result.iterations = iterations_;
+  result.residual = left_over_ / reaction_;
   return result;
 }
 
