@@ -48,7 +48,9 @@ class LoopTest(unittest.TestCase):
         subscriber = rospy.Subscriber(node.name + '/contacts', Contacts, take, queue_size=10000)
         self.assertTrue(wait_until(lambda: subscriber.get_num_connections() > 0))
         loops, rate = (1000, 10) if LONG else (20, 10)
-        player = subprocess.Popen(['rosbag', 'play', '--quiet', '--loop', '--delay=1', '--rate=%d' % rate, path],
+        # A player that was held up catches up in one burst, of which its usual queue of 100 may lose the oldest.
+        player = subprocess.Popen(['rosbag', 'play', '--quiet', '--loop', '--delay=1', '--rate=%d' % rate,
+                                   '--queue=%d' % (loops * POSES), path],
                                   stdin=subprocess.DEVNULL, start_new_session=True)
         try:
             done = wait_until(lambda: len(answers) >= loops or player.poll() is not None, 60 + loops)
@@ -59,7 +61,8 @@ class LoopTest(unittest.TestCase):
         grown = memory[loops - 1] - memory[loops // 2]
         print('%d loops, memory %+.3f MB over the second half' % (loops, grown / 1e6))
         self.assertGreater(len(answers[0]), 0)
-        self.assertTrue(all(answer == answers[0] for answer in answers), 'every loop ends with the same contacts')
+        others = [i for i, answer in enumerate(answers) if answer != answers[0]]
+        self.assertEqual(others, [], 'every loop ends with the same contacts; %s' % node.diagnostics)
         self.assertLess(grown, MOST_GROWTH)
         self.assertTrue(wait_until(lambda: int(node.diagnostics['new_runs']) >= loops - 1), node.diagnostics)
         self.assertEqual(node.diagnostics['recoveries'], '0')
