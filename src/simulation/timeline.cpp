@@ -1,6 +1,7 @@
 #include "tissue_sim/simulation/timeline.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "tissue_sim/simulation/integrator.h"
 #include "tissue_sim/simulation/levels.h"
@@ -14,7 +15,7 @@ namespace {
 constexpr double nanosecond = 1e-9;
 
 std::int64_t in_nanoseconds(double seconds) {
-  return static_cast<std::int64_t>(seconds / nanosecond + 0.5);
+  return std::llround(seconds / nanosecond);
 }
 
 const Scene& with_models_chosen(const Scene& scene) {

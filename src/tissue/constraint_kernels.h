@@ -293,7 +293,7 @@ TISSUE_SIM_KERNEL void add_triangles(const TriangleBatch& batch, std::size_t l, 
     at.force(batch.vertices[0][l + i]) += q1[i] + q2[i];
     at.force(batch.vertices[1][l + i]) -= q1[i];
     at.force(batch.vertices[2][l + i]) -= q2[i];
-    for (std::size_t corner_ = 0; corner_ < 3; ++corner_) at.normal(batch.vertices[corner_][l + i]) += normals[i];
+    for (const auto& vertices : batch.vertices) at.normal(vertices[l + i]) += normals[i];
   }
 }
 

@@ -9,7 +9,7 @@ double EnclosedVolume::evaluate(const std::vector<Vector3>& positions, const std
                                 std::vector<Vector3>& gradient) const {
   // Six times the volume is the sum of p_a . (p_b x p_c). Taken from a vertex of the surface, not from the origin: far
   // from the origin the terms would cancel to nothing.
-  const Vector3 origin = positions.front();
+  const Vector3& origin = positions.front();
   std::fill(gradient.begin(), gradient.end(), Vector3::Zero());
   const double sixth = 1.0 / (6.0 * rest);
   double six_volumes = 0.0;
