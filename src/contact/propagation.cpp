@@ -9,7 +9,7 @@ namespace {
 
 constexpr int not_reached = std::numeric_limits<int>::max();
 constexpr int not_colliding = -1;
-constexpr double cancelled = 1e-3;  ///< of the weight: less is left of the directions and they have no common one
+constexpr double no_direction = 1e-3;  ///< of the weight: less is left of the directions and they have no common one
 
 template <class Visit>
 void for_each_neighbour(const MeshTopology& topology, int vertex, Visit&& visit) {
@@ -36,7 +36,7 @@ void take_from_neighbours(const OrganSurface& organ, const InstrumentSurface& in
     direction_sum += weight * r_j;
   });
 
-  if (direction_sum.norm() > cancelled * weight_sum) {
+  if (direction_sum.norm() > no_direction * weight_sum) {
     penetration.depth[vertex] = std::max(0.0, depth_sum / weight_sum);
     penetration.direction[vertex] = direction_sum.normalized();
   } else {

@@ -99,7 +99,7 @@ int count_duplicates(std::vector<Tetrahedron> sorted) {
   return duplicates;
 }
 
-bool has_repeated_corner(Tetrahedron t) {
+bool repeats_a_corner(Tetrahedron t) {
   std::sort(t.begin(), t.end());
   return std::adjacent_find(t.begin(), t.end()) != t.end();
 }
@@ -199,7 +199,7 @@ TetrahedralFaults inspect(const TetrahedralMesh& mesh) {
   inverted.reserve(mesh.tetrahedra.size());
   for (const Tetrahedron& t : mesh.tetrahedra) {
     for (const int v : t) referenced[v] = 1;
-    if (has_repeated_corner(t)) {
+    if (repeats_a_corner(t)) {
       ++faults.repeated_corners;
       continue;
     }

@@ -10,6 +10,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "tissue_sim/ros/frames.h"
+
 namespace tissue_sim {
 namespace {
 
@@ -132,10 +134,6 @@ struct Chunk {
   Record record;
   std::vector<Index> indices;  ///< that stand behind it
 };
-
-std::string without_slash(const std::string& topic) {
-  return !topic.empty() && topic[0] == '/' ? topic.substr(1) : topic;
-}
 
 /// The bytes of a packed chunk. Where it unpacks to less than it says, rosbag would read what its memory held before:
 /// unpacked twice over other bytes, the same must come out.

@@ -21,10 +21,6 @@ namespace {
 
 const std::string pose_type = "geometry_msgs/PoseStamped";
 
-std::string without_slash(const std::string& topic) {
-  return !topic.empty() && topic[0] == '/' ? topic.substr(1) : topic;
-}
-
 const std::vector<std::string> transform_topics{"/tf", "tf", "/tf_static", "tf_static"};
 
 void open_to_read(rosbag::Bag& bag, const Scene& scene, const std::string& path) {

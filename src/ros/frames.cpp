@@ -13,12 +13,11 @@ namespace {
 /// Of one transform whose frames have no name: header 16, name of the child 4, seven numbers of 8.
 constexpr std::size_t least_transform_bytes = 76;
 
-// tf2 refuses the leading slash that older drivers still write.
-std::string without_slash(const std::string& frame) {
-  return !frame.empty() && frame[0] == '/' ? frame.substr(1) : frame;
-}
-
 }  // namespace
+
+std::string without_slash(const std::string& name) {
+  return !name.empty() && name[0] == '/' ? name.substr(1) : name;
+}
 
 bool into_scene_frame(const tf2::BufferCore& transforms, const std::string& scene_frame,
                       const geometry_msgs::PoseStamped& message, FramedPose& pose, std::string& why) {

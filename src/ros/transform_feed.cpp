@@ -44,7 +44,7 @@ namespace tissue_sim {
 namespace {
 
 constexpr unsigned queue_size = 100;
-constexpr double warning_period = 5.0;  // s
+constexpr double sender_warning_period = 5.0;  // s
 
 }  // namespace
 
@@ -78,7 +78,7 @@ void TransformFeed::take(const RawTransforms& message, const std::string& sender
   tf2_msgs::TFMessage parsed;
   std::vector<std::uint8_t> bytes = message.bytes;
   if (!deserialize_transforms(bytes, parsed)) {
-    ROS_WARN_STREAM_THROTTLE(warning_period, sender << " sends transforms that are cut short; they are dropped");
+    ROS_WARN_STREAM_THROTTLE(sender_warning_period, sender << " sends transforms that are cut short; they are dropped");
     return;
   }
   for (const geometry_msgs::TransformStamped& transform : parsed.transforms) {

@@ -70,13 +70,13 @@ std::map<std::string, Pose> place_links(const std::string& path, const urdf::Mod
   return poses;
 }
 
-struct Shape {
+struct LinkShape {
   urdf::GeometrySharedPtr geometry;
   Pose origin;
 };
 
-std::vector<Shape> shapes_of(const urdf::Link& link, bool& fell_back) {
-  std::vector<Shape> shapes;
+std::vector<LinkShape> shapes_of(const urdf::Link& link, bool& fell_back) {
+  std::vector<LinkShape> shapes;
   for (const auto& c : link.collision_array) {
     if (c && c->geometry) shapes.push_back({c->geometry, to_pose(c->origin)});
   }
@@ -164,9 +164,9 @@ std::vector<InstrumentPart> load_instrument(const std::string& path, const std::
   for (const auto& [name, pose] : poses) {
     const std::string where = path + ": link '" + one_line(name) + "': ";
     bool fell_back = false;
-    const std::vector<Shape> shapes = shapes_of(*model->getLink(name), fell_back);
+    const std::vector<LinkShape> shapes = shapes_of(*model->getLink(name), fell_back);
     if (fell_back && !shapes.empty()) warnings.push_back(where + "has no <collision>, its <visual> is used");
-    for (const Shape& shape : shapes) {
+    for (const LinkShape& shape : shapes) {
       std::vector<std::string> mended;
       InstrumentMesh piece;
       try {

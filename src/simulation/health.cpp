@@ -10,26 +10,26 @@ namespace tissue_sim {
 
 namespace {
 
-constexpr double fastest = 1500.0;  ///< m/s, the speed of sound in soft tissue
-constexpr double farthest = 10.0;   ///< times the organ's size
+constexpr double speed_of_sound = 1500.0;  ///< m/s, the speed of sound in soft tissue
+constexpr double organ_sizes = 10.0;       ///< times the organ's size
 
 /// Vertices of which a step looks at everything, in turn: some 5 us. A million would cost more than the step.
 constexpr std::size_t looked_at_in_turn = 1024;
 
 /// One vertex. Written so that a NaN fails.
 bool healthy(const Vector3& rest, const Vector3& position, const Vector3& velocity, double limit) {
-  return (position - rest).squaredNorm() < limit && velocity.squaredNorm() < fastest * fastest;
+  return (position - rest).squaredNorm() < limit && velocity.squaredNorm() < speed_of_sound * speed_of_sound;
 }
 
 }  // namespace
 
 bool runs_away(double speed) {
-  return !(speed < fastest);
+  return !(speed < speed_of_sound);
 }
 
 bool healthy(const OrganModel& model, const OrganState& state) {
   const RestShape& rest = model.rest;
-  const double limit = farthest * farthest * rest.size * rest.size;
+  const double limit = organ_sizes * organ_sizes * rest.size * rest.size;
   const auto sound = [limit](const RestShape& shape, const auto& at, std::size_t v) {
     return healthy(shape.positions[v], at.positions[v], at.velocities[v], limit);
   };

@@ -6,7 +6,7 @@
 namespace tissue_sim {
 
 namespace {
-constexpr double farthest = 1000.0;                                                      ///< m from the scene's origin
+constexpr double from_origin = 1000.0;                                                   ///< m from the scene's origin
 constexpr std::int64_t latest = (4'294'967'295 - 86'400) * std::int64_t{1'000'000'000};  ///< ns: 2^32 s but for a day
 constexpr double shortest_quaternion = 1e-6;
 constexpr double off_unit_length = 1e-3;  ///< of a quaternion: rounding and drift stay well below
@@ -60,7 +60,7 @@ PoseVerdict judge_pose(StampedPose& pose, bool& normalised) {
   if (pose.stamp > latest) return PoseVerdict::late_stamp;
   Eigen::Vector4d& q = pose.pose.orientation.coeffs();
   if (!are_numbers(pose.pose.position) || !are_numbers(q)) return PoseVerdict::non_finite;
-  if (pose.pose.position.cwiseAbs().maxCoeff() > farthest) return PoseVerdict::too_far;
+  if (pose.pose.position.cwiseAbs().maxCoeff() > from_origin) return PoseVerdict::too_far;
   const double largest = q.cwiseAbs().maxCoeff();
   if (!(largest > shortest_quaternion)) return PoseVerdict::zero_quaternion;
   normalised = std::abs(q.stableNorm() - 1.0) > off_unit_length;

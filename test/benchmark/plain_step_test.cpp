@@ -9,7 +9,7 @@
 #include "tissue_sim/simulation/step.h"
 #include "tissue_sim/study/paper_protocol.h"
 
-namespace tissue_sim {
+namespace tissue_sim::plain_step_test {
 namespace {
 
 struct Comparison {
@@ -122,4 +122,4 @@ TEST(PlainStep, ComparisonSeesAnInstrumentThatIsOneStepBehind) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::plain_step_test

@@ -6,7 +6,7 @@
 #include <random>
 #include <set>
 
-namespace tissue_sim {
+namespace tissue_sim::ascending_set_test {
 namespace {
 
 TEST(AscendingSet, GivesWhatWasAddedOnceAndInOrder) {
@@ -31,4 +31,4 @@ TEST(AscendingSet, GivesWhatWasAddedOnceAndInOrder) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::ascending_set_test

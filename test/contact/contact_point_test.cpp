@@ -8,7 +8,7 @@
 #include "tissue_sim/contact/response.h"
 #include "tissue_sim/geometry/embedding.h"
 
-namespace tissue_sim {
+namespace tissue_sim::contact_point_test {
 namespace {
 
 std::vector<int> all_vertices(const InstrumentSurface& instrument) {
@@ -362,4 +362,4 @@ TEST(PokeContacts, PositionsThatAreNoNumbersTouchNothing) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::contact_point_test

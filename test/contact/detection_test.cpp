@@ -7,7 +7,7 @@
 #include "floating_point_traps.h"
 #include "tissue_sim/geometry/edge_triangle.h"
 
-namespace tissue_sim {
+namespace tissue_sim::detection_test {
 namespace {
 
 std::vector<TriangleMesh> instruments() {
@@ -301,4 +301,4 @@ TEST(Detection, ThePapersMemoryMissesAJumpInAndTheFloodDoesNot) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::detection_test

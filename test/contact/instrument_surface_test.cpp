@@ -5,7 +5,7 @@
 #include "geometry/twins.h"
 #include "tissue_sim/geometry/primitives.h"
 
-namespace tissue_sim {
+namespace tissue_sim::instrument_surface_test {
 namespace {
 
 TEST(InstrumentSurface, KnowsItsNormalsAndReach) {
@@ -56,4 +56,4 @@ TEST(ClosestFeature, WhatIsNoNumberIsFarOutside) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::instrument_surface_test

@@ -3,7 +3,7 @@
 #include "contact/test_organ.h"
 #include "tissue_sim/contact/propagation.h"
 
-namespace tissue_sim {
+namespace tissue_sim::penetration_test {
 namespace {
 
 /// A tetrahedron whose vertex 0 is p and whose edges from there run along x, y and z.
@@ -121,4 +121,4 @@ TEST(Penetration, ExactIsTheClosestPointForAll) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::penetration_test

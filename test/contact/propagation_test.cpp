@@ -2,7 +2,7 @@
 
 #include "contact/test_organ.h"
 
-namespace tissue_sim {
+namespace tissue_sim::propagation_test {
 namespace {
 
 // Eq. 4: mu(p_j, p) = 1 / |p_j - p|^2. Eq. 5: d(p) = sum mu_j ((p_j - p) . r(p_j) + d(p_j)) / sum mu_j.
@@ -133,4 +133,4 @@ TEST(Propagation, LeavesItsWorkingListClean) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::propagation_test

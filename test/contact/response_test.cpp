@@ -4,7 +4,7 @@
 
 #include "geometry/twins.h"
 
-namespace tissue_sim {
+namespace tissue_sim::response_test {
 namespace {
 
 ContactPoint point_at(const std::array<int, 3>& vertices, const Vector3& weights, const Vector3& direction,
@@ -333,4 +333,4 @@ TEST(BearForces, PointsThatShareVerticesBearWhatTheyHold) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::response_test

@@ -8,7 +8,7 @@
 #include "floating_point_traps.h"
 #include "geometry/twins.h"
 
-namespace tissue_sim {
+namespace tissue_sim::surface_patches_test {
 namespace {
 
 struct PatchedOrgan {
@@ -247,4 +247,4 @@ TEST(SurfacePatches, AVertexThatIsNoNumberHidesNoOther) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::surface_patches_test

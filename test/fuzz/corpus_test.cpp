@@ -9,7 +9,7 @@
 #include "entries.h"
 #include "floating_point_traps.h"
 
-namespace tissue_sim {
+namespace tissue_sim::corpus_test {
 namespace {
 
 const std::map<std::string, Door> doors = {{"scene", enter_scene}, {"urdf", enter_urdf}, {"obj", enter_obj},
@@ -100,4 +100,4 @@ TEST(Corpus, WhatWasFoundIsRefusedForItsReason) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::corpus_test

@@ -10,7 +10,7 @@
 #include "tissue_sim/scene/scene_file.h"
 #include "tissue_sim/study/temporary_folder.h"
 
-namespace tissue_sim {
+namespace tissue_sim::damaged_scenes_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -152,4 +152,4 @@ TEST(ShippedInstruments, LoadOrAreRefusedByNameWhateverIsCutOrChanged) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::damaged_scenes_test

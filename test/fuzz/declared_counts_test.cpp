@@ -6,7 +6,7 @@
 #include "benchmark/counted_heap.h"
 #include "entries.h"
 
-namespace tissue_sim {
+namespace tissue_sim::declared_counts_test {
 namespace {
 
 constexpr std::size_t allowed = 16'000'000;
@@ -69,4 +69,4 @@ TEST(DeclaredCounts, AreHeldAgainstTheBytesThatAreThere) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::declared_counts_test

@@ -13,7 +13,7 @@
 #include "tissue_sim/ros/frames.h"
 #include "tissue_sim/ros/messages.h"
 
-namespace tissue_sim {
+namespace tissue_sim::poses_test {
 namespace {
 
 constexpr std::int64_t ms = 1'000'000;
@@ -292,4 +292,4 @@ TEST(HostilePoses, LeaveAnElasticOrganFiniteAndInItsPlace) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::poses_test

@@ -6,7 +6,7 @@
 
 #include "geometry/twins.h"
 
-namespace tissue_sim {
+namespace tissue_sim::aabb_tree_test {
 namespace {
 
 using Pair = std::pair<int, int>;
@@ -166,4 +166,4 @@ TEST(AabbTree, ABoxThatIsNoNumberHidesNoOther) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::aabb_tree_test

@@ -6,7 +6,7 @@
 #include "geometry/twins.h"
 #include "tissue_sim/geometry/primitives.h"
 
-namespace tissue_sim {
+namespace tissue_sim::closest_point_test {
 namespace {
 
 constexpr double far_away = 1e150;
@@ -160,4 +160,4 @@ TEST(Pseudonormal, DoesNotDependOnTheTriangleAsked) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::closest_point_test

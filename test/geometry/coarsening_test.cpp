@@ -9,7 +9,7 @@
 #include "tissue_sim/geometry/primitives.h"
 #include "twins.h"
 
-namespace tissue_sim {
+namespace tissue_sim::coarsening_test {
 namespace {
 
 std::vector<double> sorted_edges(const TriangleMesh& mesh) {
@@ -118,4 +118,4 @@ TEST(Coarsen, GivesTheSameBitsAgain) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::coarsening_test

@@ -6,7 +6,7 @@
 #include "geometry/twins.h"
 #include "tissue_sim/geometry/primitives.h"
 
-namespace tissue_sim {
+namespace tissue_sim::edge_triangle_test {
 namespace {
 
 const std::array<Vector3, 3> right_angled = {Vector3(0, 0, 0), Vector3(1, 0, 0), Vector3(0, 1, 0)};
@@ -151,4 +151,4 @@ TEST(EdgeTriangle, CornersAndRimsAreHitOnce) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::edge_triangle_test

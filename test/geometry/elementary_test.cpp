@@ -11,7 +11,7 @@
 #include "floating_point_traps.h"
 #include "tissue_sim/geometry/pose.h"
 
-namespace tissue_sim {
+namespace tissue_sim::elementary_test {
 namespace {
 
 constexpr long double pi = 3.14159265358979323846264338327950288L;
@@ -124,4 +124,4 @@ TEST_F(Elementary, InterpolateIsAnEvenTurn) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::elementary_test

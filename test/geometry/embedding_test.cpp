@@ -7,7 +7,7 @@
 
 #include "twins.h"
 
-namespace tissue_sim {
+namespace tissue_sim::embedding_test {
 namespace {
 
 /// Barycentric coordinates from a 4 by 4 system: the weights sum to 1 and give the point.
@@ -211,4 +211,4 @@ TEST(Embed, ManagesNoPoints) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::embedding_test

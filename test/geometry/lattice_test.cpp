@@ -6,7 +6,7 @@
 
 #include "tissue_sim/geometry/primitives.h"
 
-namespace tissue_sim {
+namespace tissue_sim::lattice_test {
 namespace {
 
 double filled_volume(const Lattice& lattice) {
@@ -75,4 +75,4 @@ TEST(Lattice, IsTheSameEveryTime) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::lattice_test

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace tissue_sim {
+namespace tissue_sim::primitives_test {
 namespace {
 
 constexpr double pi = 3.14159265358979323846;
@@ -56,4 +56,4 @@ TEST(Box, VolumeAndExtent) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::primitives_test

@@ -7,7 +7,7 @@
 #include "tissue_sim/geometry/primitives.h"
 #include "tissue_sim/geometry/wide_tree.h"
 
-namespace tissue_sim {
+namespace tissue_sim::random_pairs_test {
 namespace {
 
 using Pair = std::pair<int, int>;
@@ -142,4 +142,4 @@ TEST(RandomMeshPairs, TreesFindWhatBruteForceFindsAndRefittedWhatRebuiltFinds) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::random_pairs_test

@@ -11,7 +11,7 @@
 #include "floating_point_traps.h"
 #include "twins.h"
 
-namespace tissue_sim {
+namespace tissue_sim::tetrahedral_mesh_test {
 namespace {
 
 const TetrahedralMesh one = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 1, 2, 3}}};
@@ -321,4 +321,4 @@ TEST(SolidVolume, CountsInvertedAsNegative) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::tetrahedral_mesh_test

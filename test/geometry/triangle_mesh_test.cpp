@@ -11,7 +11,7 @@
 #include "floating_point_traps.h"
 #include "tissue_sim/geometry/primitives.h"
 
-namespace tissue_sim {
+namespace tissue_sim::triangle_mesh_test {
 namespace {
 
 TriangleMesh tetrahedron() {
@@ -165,7 +165,7 @@ TEST(Inspect, SoundMeshHasNoFault) {
 }
 
 TEST(Inspect, NothingIsNotASurface) {
-  EXPECT_FALSE(inspect({}).closed_manifold());
+  EXPECT_FALSE(inspect(TriangleMesh{}).closed_manifold());
 }
 
 TEST(Inspect, CountsIndicesThatAreNotThere) {
@@ -383,4 +383,4 @@ TEST(TriangleMesh, AMillionTrianglesTakeSeconds) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::triangle_mesh_test

@@ -4,7 +4,7 @@
 
 #include "geometry/twins.h"
 
-namespace tissue_sim {
+namespace tissue_sim::turned_box_test {
 namespace {
 
 std::array<Vector3, 8> corners_of(const Box& box) {
@@ -72,4 +72,4 @@ TEST(TurnedBox, ContainsABallThatStaysInside) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::turned_box_test

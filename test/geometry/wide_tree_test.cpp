@@ -11,7 +11,7 @@
 #include "tissue_sim/geometry/edge_triangle.h"
 #include "tissue_sim/geometry/primitives.h"
 
-namespace tissue_sim {
+namespace tissue_sim::wide_tree_test {
 namespace {
 
 using Pair = std::pair<int, int>;
@@ -335,4 +335,4 @@ TEST(WideTree, ManyTrianglesInOnePlaceAndNumbersThatAreNone) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::wide_tree_test

@@ -12,7 +12,7 @@
 #include "tissue_sim/scene/scene_file.h"
 #include "tissue_sim/study/temporary_folder.h"
 
-namespace tissue_sim {
+namespace tissue_sim::dvrk_replay_test {
 namespace {
 
 /// The real recording through the real forceps over the real organ, whole: every pose used, contact at least 10 mm
@@ -62,4 +62,4 @@ TEST(DvrkReplay, PressesTheStomachAndLetsItComeBack) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::dvrk_replay_test

@@ -10,7 +10,7 @@
 #include "tissue_sim/simulation/accuracy.h"
 #include "tissue_sim/study/temporary_folder.h"
 
-namespace tissue_sim {
+namespace tissue_sim::golden_test {
 namespace {
 
 const std::string source = TISSUE_SIM_SOURCE_DIR;
@@ -71,4 +71,4 @@ TEST(GoldenHashes, HoldForEveryShippedScene) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::golden_test

@@ -14,7 +14,7 @@
 #include "tissue_sim/ros/messages.h"
 #include "tissue_sim/study/temporary_folder.h"
 
-namespace tissue_sim {
+namespace tissue_sim::replay_test {
 namespace {
 
 bool exists(const std::string& path) {
@@ -163,4 +163,4 @@ TEST_F(ReplayTest, OutputThatCannotBeWritten) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::replay_test

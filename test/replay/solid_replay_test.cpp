@@ -7,7 +7,7 @@
 #include "tissue_sim/scene/scene_file.h"
 #include "tissue_sim/study/temporary_folder.h"
 
-namespace tissue_sim {
+namespace tissue_sim::solid_replay_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -86,4 +86,4 @@ TEST(SolidReplay, TheRealStomachUnderTheRealRecording) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::solid_replay_test

@@ -8,7 +8,7 @@
 
 #include "floating_point_traps.h"
 
-namespace tissue_sim {
+namespace tissue_sim::frames_test {
 namespace {
 
 constexpr double half_root = 0.70710678118654752;
@@ -144,4 +144,4 @@ TEST(FrameHistory, GivesTheLastPoseAtOrBefore) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::frames_test

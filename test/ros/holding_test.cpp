@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace tissue_sim {
+namespace tissue_sim::holding_test {
 namespace {
 
 constexpr std::int64_t second = 1'000'000'000;
@@ -39,4 +39,4 @@ TEST(Holding, FollowsAClockThatTicksSeldom) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::holding_test

@@ -4,7 +4,7 @@
 
 #include "ros/ball_scene.h"
 
-namespace tissue_sim {
+namespace tissue_sim::messages_test {
 namespace {
 
 constexpr double half_root = 0.70710678118654752;
@@ -127,4 +127,4 @@ TEST(Messages, MarkersBeforeTheFirstStep) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::messages_test

@@ -7,7 +7,7 @@
 
 #include "tissue_sim/study/temporary_folder.h"
 
-namespace tissue_sim {
+namespace tissue_sim::instrument_file_test {
 namespace {
 
 Vector3 centre(const TriangleMesh& mesh) {
@@ -121,4 +121,4 @@ TEST(InstrumentFile, RealForceps) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::instrument_file_test

@@ -6,7 +6,7 @@
 #include "floating_point_traps.h"
 #include "tissue_sim/scene/scene_file.h"
 
-namespace tissue_sim {
+namespace tissue_sim::malformed_test {
 namespace {
 
 const std::string folder = TISSUE_SIM_SOURCE_DIR "/test/malformed/";
@@ -174,4 +174,4 @@ TEST(MalformedScenes, TheFileThatTheyAreMadeFromLoads) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::malformed_test

@@ -12,7 +12,7 @@
 #include "tissue_sim/scene/scene.h"
 #include "tissue_sim/study/temporary_folder.h"
 
-namespace tissue_sim {
+namespace tissue_sim::mesh_file_test {
 namespace {
 
 std::string ply_of(const TriangleMesh& mesh) {
@@ -255,4 +255,4 @@ TEST(InstrumentMesh, NonFiniteTrianglesAreDropped) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::mesh_file_test

@@ -6,7 +6,7 @@
 #include "tissue_sim/scene/scene.h"
 #include "tissue_sim/study/temporary_folder.h"
 
-namespace tissue_sim {
+namespace tissue_sim::resource_path_test {
 namespace {
 
 TEST(ResourcePath, PlainPathsStartWhereTheyAreNamed) {
@@ -52,4 +52,4 @@ TEST(ResourcePath, InstalledPackagesAndTheOwnOneNeedNoPackagePath) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::resource_path_test

@@ -7,7 +7,7 @@
 
 #include "tissue_sim/study/temporary_folder.h"
 
-namespace tissue_sim {
+namespace tissue_sim::scene_file_test {
 namespace {
 
 const char* const octahedron =
@@ -302,4 +302,4 @@ TEST(SceneFile, EveryDamagedByteLoadsOrIsASceneError) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::scene_file_test

@@ -13,7 +13,7 @@
 #include "tissue_sim/scene/scene.h"
 #include "tissue_sim/study/temporary_folder.h"
 
-namespace tissue_sim {
+namespace tissue_sim::tetrahedral_mesh_file_test {
 namespace {
 
 const std::string folder = TISSUE_SIM_SOURCE_DIR "/test/malformed/msh/";
@@ -303,4 +303,4 @@ TEST(TetrahedralMeshFile, EveryCutAndEveryChangedByteIsReadOrRefusedInOneLine) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::tetrahedral_mesh_file_test

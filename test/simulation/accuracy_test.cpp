@@ -11,7 +11,7 @@
 #include "tissue_sim/simulation/timeline.h"
 #include "tissue_sim/study/temporary_folder.h"
 
-namespace tissue_sim {
+namespace tissue_sim::accuracy_test {
 namespace {
 
 using Goal = Accuracy::Goal;
@@ -357,4 +357,4 @@ TEST(AccuracyTable, IsFoundFromTheProgramWhereNoEnvironmentAndNoSceneLeadsToIt) 
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::accuracy_test

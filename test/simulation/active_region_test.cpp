@@ -11,7 +11,7 @@
 #include "tissue_sim/simulation/health.h"
 #include "tissue_sim/simulation/levels.h"
 
-namespace tissue_sim {
+namespace tissue_sim::active_region_test {
 namespace {
 
 constexpr double tube_radius = 0.015;  // m
@@ -264,4 +264,4 @@ TEST(WallRegion, HealthPutsTheLastGoodStateBack) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::active_region_test

@@ -3,7 +3,7 @@
 #include "benchmark/counted_heap.h"
 #include "simulation/solid_scenes.h"
 
-namespace tissue_sim {
+namespace tissue_sim::allocation_test {
 namespace {
 
 /// 100 ms in, 100 ms out, the same way each time.
@@ -151,4 +151,4 @@ TEST(Allocation, NoneInAWarmStepOfThePapersScheme) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::allocation_test

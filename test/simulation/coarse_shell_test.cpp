@@ -6,7 +6,7 @@
 #include "geometry/twins.h"
 #include "simulation/test_scenes.h"
 
-namespace tissue_sim {
+namespace tissue_sim::coarse_shell_test {
 namespace {
 
 constexpr double ball_radius = 0.008;  // m
@@ -148,4 +148,4 @@ TEST(CoarseShellPressed, AgreesBetweenTheIntegrators) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::coarse_shell_test

@@ -8,7 +8,7 @@
 #include "tissue_sim/tissue/energy.h"
 
 /// What no contact gives, no substep makes.
-namespace tissue_sim {
+namespace tissue_sim::conservation_test {
 namespace {
 
 int random_starts() {
@@ -168,4 +168,4 @@ TEST(Conservation, AnElasticOrganComesBackToAMillionthOfItsSize) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::conservation_test

@@ -5,7 +5,7 @@
 
 #include "simulation/test_scenes.h"
 
-namespace tissue_sim {
+namespace tissue_sim::dvrk_test {
 namespace {
 
 int naming(const std::vector<std::string>& warnings, const std::string& word) {
@@ -29,4 +29,4 @@ TEST(Dvrk, TheRealOrganAndForcepsLoadWithWarnings) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::dvrk_test

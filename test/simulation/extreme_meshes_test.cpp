@@ -10,7 +10,7 @@
 #include "tissue_sim/simulation/timeline.h"
 #include "tissue_sim/study/temporary_folder.h"
 
-namespace tissue_sim {
+namespace tissue_sim::extreme_meshes_test {
 namespace {
 
 constexpr double radius = 0.03;  // m
@@ -288,4 +288,4 @@ TEST(ExtremeMeshes, AMillionTriangles) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::extreme_meshes_test

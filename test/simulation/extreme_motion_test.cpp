@@ -6,7 +6,7 @@
 #include "tissue_sim/simulation/timeline.h"
 
 /// Instruments that move faster than any hand, and stand where none can.
-namespace tissue_sim {
+namespace tissue_sim::extreme_motion_test {
 namespace {
 
 constexpr double ball_radius = 0.002;  // m
@@ -361,4 +361,4 @@ TEST(ExtremeMotion, AnEndThatSwingsThroughTheOrganIsFelt) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::extreme_motion_test

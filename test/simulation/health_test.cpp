@@ -9,7 +9,7 @@
 #include "geometry/twins.h"
 #include "simulation/solid_scenes.h"
 
-namespace tissue_sim {
+namespace tissue_sim::health_test {
 namespace {
 
 constexpr double bad_numbers[] = {std::numeric_limits<double>::quiet_NaN(),
@@ -280,4 +280,4 @@ TEST(Injected, IntoALargeOrganAsleepIsFoundInTurn) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::health_test

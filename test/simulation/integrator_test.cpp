@@ -7,7 +7,7 @@
 #include "geometry/twins.h"
 #include "simulation/test_scenes.h"
 
-namespace tissue_sim {
+namespace tissue_sim::integrator_test {
 namespace {
 
 Organ solid_block(Model model) {
@@ -150,4 +150,4 @@ TEST(ElementForces, OfAPartOfAWallAreTheSameBitsWhereAllElementsAreInIt) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::integrator_test

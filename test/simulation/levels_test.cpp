@@ -9,7 +9,7 @@
 #include "simulation/solid_scenes.h"
 #include "tissue_sim/simulation/timeline.h"
 
-namespace tissue_sim {
+namespace tissue_sim::levels_test {
 namespace {
 
 constexpr double radius = 0.0067;  // m, of the ball: two cells
@@ -357,4 +357,4 @@ TEST(Levels, ATimelineTellsOfThemAndOfHowMuchIsAwake) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::levels_test

@@ -7,7 +7,7 @@
 #include "simulation/test_scenes.h"
 #include "tissue_sim/geometry/closest_point.h"
 
-namespace tissue_sim {
+namespace tissue_sim::no_contact_missed_test {
 namespace {
 
 constexpr double probe_radius = 0.001;  // m
@@ -230,4 +230,4 @@ TEST(NoContactMissed, LyingAcrossElastic) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::no_contact_missed_test

@@ -5,7 +5,7 @@
 #include <deque>
 #include <random>
 
-namespace tissue_sim {
+namespace tissue_sim::pose_track_test {
 namespace {
 
 TEST(PoseQueue, IsADeque) {
@@ -53,4 +53,4 @@ TEST(PoseVerdict, HasAWordForEach) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::pose_track_test

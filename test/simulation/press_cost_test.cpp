@@ -4,7 +4,7 @@
 
 #include "simulation/test_scenes.h"
 
-namespace tissue_sim {
+namespace tissue_sim::press_cost_test {
 namespace {
 
 TEST(Press, IsInContactAndEnds) {
@@ -20,4 +20,4 @@ TEST(Press, IsInContactAndEnds) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::press_cost_test

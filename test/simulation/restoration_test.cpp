@@ -5,7 +5,7 @@
 
 #include "simulation/test_scenes.h"
 
-namespace tissue_sim {
+namespace tissue_sim::restoration_test {
 namespace {
 
 constexpr double ball_radius = 0.005;  // m
@@ -104,4 +104,4 @@ TEST(Restoration, OffTheSphereKeepsItsDent) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::restoration_test

@@ -6,7 +6,7 @@
 #include "tissue_sim/geometry/embedding.h"
 #include "tissue_sim/simulation/integrator.h"
 
-namespace tissue_sim {
+namespace tissue_sim::solid_test {
 namespace {
 
 constexpr double radius = 0.006;  // m
@@ -359,4 +359,4 @@ TEST(Solid, ContactsGoAlongWithTheInstrument) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::solid_test

@@ -11,7 +11,7 @@
 #include "tissue_sim/simulation/health.h"
 #include "tissue_sim/simulation/integrator.h"
 
-namespace tissue_sim {
+namespace tissue_sim::step_test {
 namespace {
 
 constexpr double ball_radius = 0.01;  // m
@@ -261,4 +261,4 @@ TEST(Step, ARecoveryOfOneOrganLeavesTheOthersWrench) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::step_test

@@ -10,7 +10,7 @@
 #include "simulation/solid_scenes.h"
 #include "tissue_sim/simulation/integrator.h"
 
-namespace tissue_sim {
+namespace tissue_sim::threads_test {
 namespace {
 
 TEST(Threads, DoEveryPartOnce) {
@@ -189,4 +189,4 @@ TEST(NumberOfThreads, LeavesEveryBitOfAPressAsItIs) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::threads_test

@@ -9,7 +9,7 @@
 
 #include "simulation/test_scenes.h"
 
-namespace tissue_sim {
+namespace tissue_sim::timeline_test {
 namespace {
 
 constexpr std::int64_t ms = 1'000'000;     // ns
@@ -468,4 +468,4 @@ TEST(Timeline, ATimeStepThatCannotBeMetIsRefusedWithOneThatCan) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::timeline_test

@@ -10,7 +10,7 @@
 #include "tissue_sim/study/study_cases.h"
 #include "tissue_sim/study/study_report.h"
 
-namespace tissue_sim {
+namespace tissue_sim::accuracy_study_test {
 namespace {
 
 StudyMesh block_mesh(int cells) {
@@ -177,4 +177,4 @@ TEST(Refinement, ASubdividedSurfaceIsTheSameSurface) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::accuracy_study_test

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace tissue_sim {
+namespace tissue_sim::growing_organ_test {
 namespace {
 
 TEST(GrowingOrgan, IsClosedAndAsLargeAsAskedWithEdgesOfTwoMillimetres) {
@@ -52,4 +52,4 @@ TEST(GrowingOrgan, ThePressEndsFourMillimetresDeep) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::growing_organ_test

@@ -5,7 +5,7 @@
 #include "tissue_sim/scene/mesh_file.h"
 #include "tissue_sim/study/temporary_folder.h"
 
-namespace tissue_sim {
+namespace tissue_sim::loading_test {
 namespace {
 
 TEST(LoadBench, ItsEllipsoidIsAClosedSurfaceOfTwentySquares) {
@@ -45,4 +45,4 @@ TEST(LoadBench, SaysWhatItLoaded) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::loading_test

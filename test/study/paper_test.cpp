@@ -4,7 +4,7 @@
 
 #include "tissue_sim/study/paper_accuracy.h"
 
-namespace tissue_sim {
+namespace tissue_sim::paper_test {
 namespace {
 
 constexpr double R = paper_radius;
@@ -108,4 +108,4 @@ TEST(PaperAccuracy, BorderDepthsAreBetterThanInnerOnes) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::paper_test

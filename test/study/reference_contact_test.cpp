@@ -6,7 +6,7 @@
 #include "tissue_sim/geometry/primitives.h"
 #include "tissue_sim/study/reference.h"
 
-namespace tissue_sim {
+namespace tissue_sim::reference_contact_test {
 namespace {
 
 constexpr double young = 5400.0;  // Pa
@@ -187,4 +187,4 @@ TEST(ReferenceContact, ASphereIsPushedBackAsHertzSays) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::reference_contact_test

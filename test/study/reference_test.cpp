@@ -7,7 +7,7 @@
 #include <random>
 #include <stdexcept>
 
-namespace tissue_sim {
+namespace tissue_sim::reference_test {
 namespace {
 
 constexpr double young = 5400.0;  // Pa
@@ -325,4 +325,4 @@ TEST(Reference, APressurisedSphereSwellsAsLameSays) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::reference_test

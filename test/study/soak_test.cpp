@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace tissue_sim {
+namespace tissue_sim::soak_test {
 namespace {
 
 TEST(Soak, PressesSlidesLeavesAndComesAgain) {
@@ -45,4 +45,4 @@ TEST(Soak, NamesWhatDoesNotHold) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::soak_test

@@ -7,7 +7,7 @@
 
 #include "floating_point_traps.h"
 
-namespace tissue_sim {
+namespace tissue_sim::stability_map_test {
 namespace {
 
 StabilityCell liver(double time_step) {
@@ -97,4 +97,4 @@ TEST(StabilityMap, NamesWhatIsNeither) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::stability_map_test

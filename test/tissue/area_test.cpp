@@ -2,7 +2,7 @@
 
 #include "tissue/element_checks.h"
 
-namespace tissue_sim {
+namespace tissue_sim::area_test {
 namespace {
 
 AreaElement element(double rest, double scale) {
@@ -54,4 +54,4 @@ TEST(Area, WithoutAnyAreaItIsFinite) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::area_test

@@ -10,7 +10,7 @@
 #include "tissue_sim/tissue/energy.h"
 #include "tissue_sim/tissue/rest_shape.h"
 
-namespace tissue_sim {
+namespace tissue_sim::coarse_shell_test {
 namespace {
 
 constexpr double radius = 0.05;
@@ -139,4 +139,4 @@ TEST(CoarseShell, BlownUpItStoresWhatTheOrganDoes) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::coarse_shell_test

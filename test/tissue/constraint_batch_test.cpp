@@ -15,7 +15,7 @@
 #include "tissue_sim/tissue/enclosed_volume.h"
 #include "tissue_sim/tissue/rest_shape.h"
 
-namespace tissue_sim {
+namespace tissue_sim::constraint_batch_test {
 namespace {
 
 constexpr InstructionSet instruction_sets[] = {InstructionSet::baseline, InstructionSet::avx2, InstructionSet::avx512};
@@ -440,4 +440,4 @@ TEST(ConstraintBatch, NoElementsAddNothing) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::constraint_batch_test

@@ -2,7 +2,7 @@
 
 #include "tissue/element_checks.h"
 
-namespace tissue_sim {
+namespace tissue_sim::distance_test {
 namespace {
 
 DistanceElement element(double rest, double scale) {
@@ -59,4 +59,4 @@ TEST(Distance, AShortRestLengthIsDividedByItsFloor) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::distance_test

@@ -5,7 +5,7 @@
 #include "geometry/twins.h"
 #include "tissue_sim/geometry/primitives.h"
 
-namespace tissue_sim {
+namespace tissue_sim::enclosed_volume_test {
 namespace {
 
 TEST(EnclosedVolume, IsTheChangeOfVolumeOverTheRest) {
@@ -58,4 +58,4 @@ TEST(EnclosedVolume, DoesNotChangeWithThePlace) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::enclosed_volume_test

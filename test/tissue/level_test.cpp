@@ -4,7 +4,7 @@
 
 #include "tissue/test_solids.h"
 
-namespace tissue_sim {
+namespace tissue_sim::level_test {
 namespace {
 
 const Vector3 size(0.11, 0.11, 0.04);  // m
@@ -109,4 +109,4 @@ TEST(Level, TheEdgeIsThatOfTheFinePartOfAGradedMesh) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::level_test

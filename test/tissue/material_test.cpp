@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace tissue_sim {
+namespace tissue_sim::material_test {
 namespace {
 
 Material material(double young, double poisson) {
@@ -39,4 +39,4 @@ TEST(WallStiffness, IsNeverNegative) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::material_test

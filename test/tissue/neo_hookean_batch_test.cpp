@@ -10,7 +10,7 @@
 
 #include "geometry/twins.h"
 
-namespace tissue_sim {
+namespace tissue_sim::neo_hookean_batch_test {
 namespace {
 
 using Vectors = NeoHookeanElement::Vectors;
@@ -316,4 +316,4 @@ TEST(NeoHookeanBatch, OneBadVertexSpoilsOnlyItsTetrahedra) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::neo_hookean_batch_test

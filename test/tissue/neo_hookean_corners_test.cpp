@@ -10,7 +10,7 @@
 #include "geometry/twins.h"
 #include "tissue_sim/geometry/tetrahedral_mesh.h"
 
-namespace tissue_sim {
+namespace tissue_sim::neo_hookean_corners_test {
 namespace {
 
 using Vectors = NeoHookeanElement::Vectors;
@@ -303,4 +303,4 @@ TEST(NeoHookeanCorners, TheCallerKeepsItsRounding) {
 #endif
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::neo_hookean_corners_test

@@ -7,7 +7,7 @@
 
 #include "geometry/twins.h"
 
-namespace tissue_sim {
+namespace tissue_sim::neo_hookean_test {
 namespace {
 
 using Vectors = NeoHookeanElement::Vectors;
@@ -268,4 +268,4 @@ TEST_F(NeoHookean, BlockOfACornerIsPositiveDefiniteEverywhere) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::neo_hookean_test

@@ -8,7 +8,7 @@
 #include "tissue_sim/geometry/primitives.h"
 #include "tissue_sim/tissue/material.h"
 
-namespace tissue_sim {
+namespace tissue_sim::rest_shape_test {
 namespace {
 
 constexpr double pi = 3.14159265358979323846;
@@ -244,4 +244,4 @@ TEST(RestShape, NamesOneVertexOfEachSurface) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::rest_shape_test

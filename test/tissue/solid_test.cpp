@@ -8,7 +8,7 @@
 #include "tissue/test_solids.h"
 #include "tissue_sim/tissue/energy.h"
 
-namespace tissue_sim {
+namespace tissue_sim::solid_test {
 namespace {
 
 const Vector3 size(0.03, 0.02, 0.015);
@@ -185,4 +185,4 @@ TEST(Solid, WhatIsAttachedIsOfTheSolid) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::solid_test

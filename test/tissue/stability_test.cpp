@@ -8,7 +8,7 @@
 #include "tissue/test_solids.h"
 #include "tissue_sim/geometry/primitives.h"
 
-namespace tissue_sim {
+namespace tissue_sim::stability_test {
 namespace {
 
 constexpr double safety = 0.4;
@@ -408,4 +408,4 @@ TEST(StableSubstep, OfASolidIsBoundedWhereItBlowsUp) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::stability_test

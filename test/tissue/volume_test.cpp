@@ -2,7 +2,7 @@
 
 #include "tissue/element_checks.h"
 
-namespace tissue_sim {
+namespace tissue_sim::volume_test {
 namespace {
 
 VolumeElement element(double rest, double scale) {
@@ -55,4 +55,4 @@ TEST(Volume, AFlatFlapIsFiniteAndResistsBending) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::volume_test

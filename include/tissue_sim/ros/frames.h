@@ -21,6 +21,9 @@ struct FramedPose {
   Eigen::Quaterniond frame_to_scene = Eigen::Quaterniond::Identity();
 };
 
+/// The name of a frame or topic without the slash that older drivers still write before it; tf2 refuses it.
+std::string without_slash(const std::string& name);
+
 /// Takes a pose into the scene's frame with the transform at the pose's own stamp. False, with `why`, when there is
 /// no such transform (yet). Without a change of frame no transform is looked up at all.
 bool into_scene_frame(const tf2::BufferCore& transforms, const std::string& scene_frame,
