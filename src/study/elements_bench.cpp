@@ -45,7 +45,7 @@ void bench_threads(JsonRows& json) {
 
 }  // namespace
 
-bool bench_elements(BenchWords words, JsonRows& json) {
+bool bench_elements(BenchWords& words, JsonRows& json) {
   if (!words.words.empty()) return false;
   std::printf("A block of cut cubes, one core, registers: %s\n\n", name(instruction_set()));
   std::printf("model   integrator            tetrahedra  ns a tetrahedron\n");

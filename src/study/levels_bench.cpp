@@ -123,6 +123,7 @@ struct Way {
     const RestShape& rest = world.organs.front().rest;
     place_surface(world.organs.front(), state.organs.front());
     std::vector<Vector3> moved;
+    moved.reserve(static_cast<std::size_t>(rest.surface_vertices));
     for (int v = 0; v < rest.surface_vertices; ++v) {
       moved.push_back(state.organs.front().positions[v] - rest.positions[v]);
     }
@@ -169,7 +170,7 @@ void print_levels(const OrganModel& model) {
 
 }  // namespace
 
-bool bench_levels(BenchWords words, JsonRows& json) {
+bool bench_levels(BenchWords& words, JsonRows& json) {
   const std::string mesh = words.take_value("--solid");
   if (!words.words.empty()) return false;
   const std::string program = std::filesystem::read_symlink("/proc/self/exe").string();

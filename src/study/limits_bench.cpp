@@ -84,7 +84,7 @@ Need need_of(const OrganSummary& organ) {
 
 }  // namespace
 
-bool bench_limits(BenchWords words, JsonRows& json) {
+bool bench_limits(BenchWords& words, JsonRows& json) {
   if (!words.words.empty()) return false;
   const double arithmetic = measure_arithmetic();
   const double memory = measure_bandwidth(256'000'000);

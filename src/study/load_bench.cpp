@@ -5,7 +5,7 @@
 
 namespace tissue_sim {
 
-bool bench_load(BenchWords words, JsonRows& json) {
+bool bench_load(BenchWords& words, JsonRows& json) {
   if (!words.words.empty()) return false;
   std::printf("An ellipsoid from its mesh file to the first step, seconds on one core\n\n");
   std::printf(

@@ -146,7 +146,7 @@ void bench_accuracy(JsonRows& json) {
 
 }  // namespace
 
-bool bench_paper(BenchWords words, JsonRows& json) {
+bool bench_paper(BenchWords& words, JsonRows& json) {
   const bool accuracy = words.take("--accuracy");
   int test = 0;
   int runs = 3;

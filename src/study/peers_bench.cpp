@@ -210,7 +210,7 @@ void bench_fcl(int runs, JsonRows& json) {
 
 }  // namespace
 
-bool bench_peers(BenchWords words, JsonRows& json) {
+bool bench_peers(BenchWords& words, JsonRows& json) {
   int runs = 3;
   const std::string only = words.take_value("--peer");
   const bool known = only.empty() || only == "bullet" || only == "fcl";

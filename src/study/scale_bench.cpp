@@ -111,7 +111,7 @@ bool read_sizes(const std::string& list, std::vector<int>& sizes) {
 
 }  // namespace
 
-bool bench_scale(BenchWords words, JsonRows& json) {
+bool bench_scale(BenchWords& words, JsonRows& json) {
   std::vector<int> sizes = {10'000, 30'000, 100'000, 300'000, 1'000'000};
   if (!read_sizes(words.take_value("--sizes"), sizes) || !words.words.empty()) return false;
   std::printf(

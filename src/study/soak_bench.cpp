@@ -6,7 +6,7 @@
 
 namespace tissue_sim {
 
-bool bench_soak(BenchWords words, JsonRows& json) {
+bool bench_soak(BenchWords& words, JsonRows& json) {
   int thousands = 3600;
   if (!words.take_number("--thousands", 20, 1'000'000, thousands) || !words.words.empty()) return false;
   const SoakFigures f = run_soak(1000LL * thousands, counted_allocations);

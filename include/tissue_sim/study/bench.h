@@ -24,16 +24,16 @@ struct BenchWords {
 };
 
 /// Takes its options, prints its table and adds its rows. False, and nothing is run: words that it does not know.
-using BenchRun = bool (*)(BenchWords words, JsonRows& json);
+using BenchRun = bool (*)(BenchWords& words, JsonRows& json);
 
 /// One a file src/study/<name>_bench.cpp, in the table of bench_main.cpp.
-bool bench_paper(BenchWords words, JsonRows& json);
-bool bench_peers(BenchWords words, JsonRows& json);
-bool bench_scale(BenchWords words, JsonRows& json);
-bool bench_limits(BenchWords words, JsonRows& json);
-bool bench_elements(BenchWords words, JsonRows& json);
-bool bench_levels(BenchWords words, JsonRows& json);
-bool bench_load(BenchWords words, JsonRows& json);
-bool bench_soak(BenchWords words, JsonRows& json);
+bool bench_paper(BenchWords& words, JsonRows& json);
+bool bench_peers(BenchWords& words, JsonRows& json);
+bool bench_scale(BenchWords& words, JsonRows& json);
+bool bench_limits(BenchWords& words, JsonRows& json);
+bool bench_elements(BenchWords& words, JsonRows& json);
+bool bench_levels(BenchWords& words, JsonRows& json);
+bool bench_load(BenchWords& words, JsonRows& json);
+bool bench_soak(BenchWords& words, JsonRows& json);
 
 }  // namespace tissue_sim
