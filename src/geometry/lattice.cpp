@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <stdexcept>
 
 namespace tissue_sim {
@@ -50,6 +51,32 @@ struct Grid {
   }
 };
 
+/// Whether the corners along a path are left-handed, and the last two change places.
+bool is_swapped(const std::array<int, 3>& cube, const std::array<int, 3>& axes) {
+  const int mirrored = cube[0] + cube[1] + cube[2];
+  const bool odd_path = axes[1] != (axes[0] + 1) % 3;
+  return (mirrored % 2 != 0) != odd_path;
+}
+
+/// As Path::number() counts them.
+std::array<int, 3> axes_of(int number) {
+  const int first = number / 2;
+  const int lower = first == 0 ? 1 : 0;
+  const int upper = first == 2 ? 1 : 2;
+  return number % 2 == 0 ? std::array<int, 3>{first, lower, upper} : std::array<int, 3>{first, upper, lower};
+}
+
+/// The bits of the three numbers in turns: cubes that follow each other by it lie close together.
+std::uint64_t interleaved(const std::array<int, 3>& cube) {
+  std::uint64_t bits = 0;
+  for (unsigned bit = 0; bit < 21; ++bit) {
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      bits |= (static_cast<std::uint64_t>(cube[axis]) >> bit & 1U) << (3 * bit + axis);
+    }
+  }
+  return bits;
+}
+
 /// Where in the grid a point is: its cube, and the tetrahedron of it by the path.
 struct Place {
   std::array<int, 3> cube{};
@@ -72,12 +99,7 @@ struct Place {
     return 6 * static_cast<std::size_t>(grid.cube(cube)) + static_cast<std::size_t>(path.number());
   }
 
-  /// Whether the corners along the path are left-handed, and the last two change places.
-  bool swapped() const {
-    const int mirrored = cube[0] + cube[1] + cube[2];
-    const bool odd_path = path.axes[1] != (path.axes[0] + 1) % 3;
-    return (mirrored % 2 != 0) != odd_path;
-  }
+  bool swapped() const { return is_swapped(cube, path.axes); }
 
   /// The grid points along the path.
   std::array<std::array<int, 3>, 4> corners() const {
@@ -187,6 +209,46 @@ Lattice cover(const TetrahedralMesh& solid, const std::vector<Vector3>& points, 
   for (const Vector3& p : solid.vertices) tetrahedron_at(p);
   for (const Vector3& p : points) tetrahedron_at(p);
   return lattice;
+}
+
+std::array<int, 4> corners_along(int n) {
+  const std::array<int, 3> axes = axes_of(n);
+  return {0, 1 << axes[0], 7 - (1 << axes[2]), 7};
+}
+
+std::vector<LatticeCube> cubes_of(const Lattice& lattice) {
+  struct Numbered {
+    std::uint64_t key;
+    LatticeCube cube;
+  };
+  std::vector<Numbered> found;
+  const Grid grid{lattice.origin, lattice.edge, lattice.cells};
+  std::array<int, 3> at{};
+  for (at[2] = 0; at[2] < lattice.cells[2]; ++at[2]) {
+    for (at[1] = 0; at[1] < lattice.cells[1]; ++at[1]) {
+      for (at[0] = 0; at[0] < lattice.cells[0]; ++at[0]) {
+        LatticeCube cube;
+        bool any = false;
+        for (int n = 0; n < 6; ++n) {
+          const int t = lattice.tetrahedra[6 * static_cast<std::size_t>(grid.cube(at)) + static_cast<std::size_t>(n)];
+          if (t < 0) continue;
+          any = true;
+          cube.tetrahedra[n] = t;
+          Tetrahedron along = lattice.mesh.tetrahedra[t];
+          if (is_swapped(at, axes_of(n))) std::swap(along[2], along[3]);
+          const std::array<int, 4> corners = corners_along(n);
+          for (std::size_t i = 0; i < 4; ++i) cube.corners[corners[i]] = along[i];
+        }
+        for (std::size_t axis = 0; axis < 3; ++axis) cube.mirrored[axis] = at[axis] % 2 != 0;
+        if (any) found.push_back({interleaved(at), cube});
+      }
+    }
+  }
+  std::sort(found.begin(), found.end(), [](const Numbered& a, const Numbered& b) { return a.key < b.key; });
+  std::vector<LatticeCube> cubes;
+  cubes.reserve(found.size());
+  for (const Numbered& numbered : found) cubes.push_back(numbered.cube);
+  return cubes;
 }
 
 Embedding embed(const std::vector<Vector3>& points, const Lattice& lattice) {

@@ -31,8 +31,8 @@ void add_batch(const Rows& rows, int scale, const RestShape& shape, std::vector<
 
 std::size_t count_batches(const RestShape& shape) {
   const ConstraintBatches& constraints = shape.constraints;
-  return shape.packed.batches.size() + constraints.pairs.size() + constraints.flaps.size() +
-         constraints.triangles.size() + constraints.distances.size();
+  return shape.packed.batches.size() + shape.cubes.batches.size() + constraints.pairs.size() +
+         constraints.flaps.size() + constraints.triangles.size() + constraints.distances.size();
 }
 
 /// Where all batches are constraints: each kind's own, ascending, as ConstraintSelection asks for.
@@ -74,6 +74,7 @@ RegionModel build_region_model(const RestShape& shape, double radius, double edg
   std::vector<Box> boxes;
   model.vertices.first.push_back(0);
   for (const NeoHookeanBatch& batch : shape.packed.batches) add_batch(batch.vertices, 1, shape, boxes, model);
+  for (const CubeBatch& batch : shape.cubes.batches) add_batch(batch.vertices, 1, shape, boxes, model);
   model.batches.build(boxes);
   return model;
 }

@@ -42,6 +42,8 @@ void forget(AwakeSolid& awake) {
   awake.vertices.clear();
   awake.packed.batches.clear();
   awake.packed.tetrahedra = 0;
+  awake.cubes.batches.clear();
+  awake.cubes.cubes = 0;
   awake.band.clear();
   awake.pins.clear();
 }
@@ -68,6 +70,39 @@ void fill_last(NeoHookeanSolid& packed) {
     for (auto& row : batch.inverse_rest) row[l] = row[last];
     batch.volume_mu[l] = batch.volume_mu[last];
     batch.volume_stiff[l] = batch.volume_stiff[last];
+  }
+}
+
+/// Tetrahedra of a cube without a free corner are left out, and so are corners that are theirs alone: nobody asks for
+/// the forces there, and somebody would have to say where they are.
+void gather_cube(const CubeBatch& from, std::size_t l, const ActiveRegion& region, AwakeSolid& awake) {
+  std::array<bool, 6> wanted{};
+  unsigned corners = 0;
+  for (int n = 0; n < 6; ++n) {
+    const std::array<int, 4> along = corners_along(n);
+    const bool free = std::any_of(along.begin(), along.end(),
+                                  [&](int corner) { return region.mark[from.vertices[corner][l]] == Part::free; });
+    wanted[n] = free && from.volume_mu[n][l] > 0.0F;
+    for (const int corner : along) corners |= wanted[n] ? 1U << static_cast<unsigned>(corner) : 0U;
+  }
+  if (corners == 0) return;
+  add_cube(from, l, awake.cubes);
+  CubeBatch& batch = awake.cubes.batches.back();
+  const std::size_t to = (awake.cubes.cubes - 1) % CubeBatch::lanes;
+  for (std::size_t i = 0; i < 8; ++i) {
+    const std::size_t corner = (corners >> i & 1U) != 0 ? i : 0;  // all tetrahedra have the first
+    batch.vertices[i][to] = place_of(from.vertices[corner][l], awake);
+  }
+  for (std::size_t n = 0; n < 6; ++n) {
+    if (!wanted[n]) batch.volume_mu[n][to] = batch.volume_stiff[n][to] = 0.0F;
+  }
+}
+
+void gather_tetrahedra(const NeoHookeanBatch& batch, std::size_t count, const ActiveRegion& region, AwakeSolid& awake) {
+  for (std::size_t l = 0; l < count; ++l) {
+    bool awake_corner = false;
+    for (const auto& row : batch.vertices) awake_corner = awake_corner || region.mark[row[l]] == Part::free;
+    if (awake_corner) add_tetrahedron(batch, l, awake);
   }
 }
 
@@ -111,7 +146,8 @@ void gather(const RegionModel& model, const RestShape& shape, const Embedding& p
   awake.made_from = region.centres;
   make_room(2 * region.free.size(), awake.vertices);
   make_room(region.free.size(), awake.band);
-  make_room(room.batches.size(), awake.packed.batches);
+  shape.cubes.cubes > 0 ? make_room(room.batches.size(), awake.cubes.batches)
+                        : make_room(room.batches.size(), awake.packed.batches);
   awake.free = region.free.size();
   for (const int v : region.free) {
     const int place = place_of(v, awake);
@@ -124,15 +160,17 @@ void gather(const RegionModel& model, const RestShape& shape, const Embedding& p
     band.damping = 2.0 * band_damping * std::sqrt(band.stiffness * band.mass);
   }
   for (const int b : room.batches) {
-    const NeoHookeanBatch& batch = shape.packed.batches[b];
-    const std::size_t count = std::min(lanes, shape.packed.tetrahedra - lanes * static_cast<std::size_t>(b));
-    for (std::size_t l = 0; l < count; ++l) {
-      bool awake_corner = false;
-      for (const auto& row : batch.vertices) awake_corner = awake_corner || region.mark[row[l]] == Part::free;
-      if (awake_corner) add_tetrahedron(batch, l, awake);
+    const auto before = static_cast<std::size_t>(b);
+    if (shape.cubes.cubes > 0) {
+      const std::size_t count = std::min(CubeBatch::lanes, shape.cubes.cubes - CubeBatch::lanes * before);
+      for (std::size_t l = 0; l < count; ++l) gather_cube(shape.cubes.batches[b], l, region, awake);
+    } else {
+      const std::size_t count = std::min(lanes, shape.packed.tetrahedra - lanes * before);
+      gather_tetrahedra(shape.packed.batches[b], count, region, awake);
     }
   }
   fill_last(awake.packed);
+  fill_last(awake.cubes);
   awake.corners = awake.vertices.size();
   gather_pins(shape, pins, awake);
   make_room_for_motion(awake);
@@ -143,6 +181,7 @@ void gather_all(const RestShape& shape, const Embedding& pins, AwakeSolid& awake
   for (std::size_t v = 0; v < shape.positions.size(); ++v) place_of(static_cast<int>(v), awake);
   awake.free = awake.corners = awake.vertices.size();
   awake.packed = shape.packed;
+  awake.cubes = shape.cubes;
   gather_pins(shape, pins, awake);
   make_room_for_motion(awake);
 }
@@ -215,6 +254,9 @@ void solid_forces(const RestShape& shape, double dt, AwakeSolid& awake) {
   }
   if (!awake.packed.batches.empty()) {
     add_neo_hookean_forces(awake.packed, awake.damped.front().data(), awake.forces.front().data());
+  }
+  if (!awake.cubes.batches.empty()) {
+    add_cube_forces(awake.cubes, awake.damped.front().data(), awake.forces.front().data());
   }
   for (const BandVertex& band : awake.band) {
     const auto stiffness = static_cast<float>(std::min(band.stiffness, 0.25 * band.mass / (dt * dt)));

@@ -39,10 +39,5 @@ struct Gathered {
   Lane fourth;
 };
 
-template <class Lane>
-TISSUE_SIM_INLINE Lane& lane(float* p) {
-  return *reinterpret_cast<Lane*>(p);
-}
-
 }  // namespace
 }  // namespace tissue_sim

@@ -14,6 +14,7 @@ namespace {
 typedef float Quad __attribute__((vector_size(16), aligned(4), may_alias));  // NOLINT(modernize-use-using)
 using Four = float __attribute__((vector_size(16)));
 using Eight = float __attribute__((vector_size(32)));
+using Sixteen = float __attribute__((vector_size(64)));
 static_assert(alignof(Quad) == alignof(float), "vectors are read from and written to plain arrays");
 
 #if defined(__clang__)
@@ -31,6 +32,61 @@ struct Three {
 template <class Lane>
 TISSUE_SIM_INLINE const Lane& lane(const float* p) {
   return *reinterpret_cast<const Lane*>(p);
+}
+
+template <class Lane>
+TISSUE_SIM_INLINE Lane& lane(float* p) {
+  return *reinterpret_cast<Lane*>(p);
+}
+
+TISSUE_SIM_INLINE const Quad& quad(const float* p) {
+  return *reinterpret_cast<const Quad*>(p);
+}
+TISSUE_SIM_INLINE Quad& quad(float* p) {
+  return *reinterpret_cast<Quad*>(p);
+}
+
+/// Four vectors into a row each of their x, y and z.
+template <std::size_t stride>
+TISSUE_SIM_INLINE void to_rows(const Quad& a, const Quad& b, const Quad& c, const Quad& d, float* rows) {
+  const Quad ab = TISSUE_SIM_SHUFFLE(a, b, 0, 4, 1, 5);  // ax bx ay by
+  const Quad cd = TISSUE_SIM_SHUFFLE(c, d, 0, 4, 1, 5);
+  quad(rows) = TISSUE_SIM_SHUFFLE(ab, cd, 0, 1, 4, 5);
+  quad(rows + stride) = TISSUE_SIM_SHUFFLE(ab, cd, 2, 3, 6, 7);
+  const Quad abz = TISSUE_SIM_SHUFFLE(a, b, 2, 6, 3, 7);
+  const Quad cdz = TISSUE_SIM_SHUFFLE(c, d, 2, 6, 3, 7);
+  quad(rows + 2 * stride) = TISSUE_SIM_SHUFFLE(abz, cdz, 0, 1, 4, 5);
+}
+
+/// The way back; the fourth component is zero.
+template <std::size_t stride>
+TISSUE_SIM_INLINE void from_rows(const float* rows, Quad& a, Quad& b, Quad& c, Quad& d) {
+  const Quad x = quad(rows);
+  const Quad y = quad(rows + stride);
+  const Quad z = quad(rows + 2 * stride);
+  const Quad zero{};
+  const Quad xy = TISSUE_SIM_SHUFFLE(x, y, 0, 4, 1, 5);  // ax ay bx by
+  const Quad zw = TISSUE_SIM_SHUFFLE(z, zero, 0, 4, 1, 5);
+  a = TISSUE_SIM_SHUFFLE(xy, zw, 0, 1, 4, 5);
+  b = TISSUE_SIM_SHUFFLE(xy, zw, 2, 3, 6, 7);
+  const Quad xy2 = TISSUE_SIM_SHUFFLE(x, y, 2, 6, 3, 7);
+  const Quad zw2 = TISSUE_SIM_SHUFFLE(z, zero, 2, 6, 3, 7);
+  c = TISSUE_SIM_SHUFFLE(xy2, zw2, 0, 1, 4, 5);
+  d = TISSUE_SIM_SHUFFLE(xy2, zw2, 2, 3, 6, 7);
+}
+
+template <class Lane>
+TISSUE_SIM_INLINE void add(const Three<Lane>& more, Three<Lane>& sum) {
+  sum.x += more.x;
+  sum.y += more.y;
+  sum.z += more.z;
+}
+
+template <class Lane>
+TISSUE_SIM_INLINE void subtract(const Three<Lane>& less, Three<Lane>& rest) {
+  rest.x -= less.x;
+  rest.y -= less.y;
+  rest.z -= less.z;
 }
 
 template <class Lane>

@@ -140,7 +140,7 @@ Level build_level(const Organ& organ, const RestShape& finest, const RestShape& 
   shape.damping_time = 2.0 * organ.material.damping / shape.fastest_frequency;
   shape.stable_substep = stable_substep(shape, solid_safety);
   shape.stiffest_element = stiffest_element(shape, shape.positions);
-  shape.packed = pack(shape.tetrahedra);
+  shape.cubes = pack(lattice, shape.tetrahedra);
   return level;
 }
 

@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "lanes.h"
+#include "neo_hookean_lanes.h"
 #include "tissue_sim/tissue/neo_hookean_corners.h"
 
 namespace tissue_sim {
@@ -13,13 +13,6 @@ namespace {
 constexpr std::size_t lanes = NeoHookeanBatch::lanes;
 constexpr std::size_t block = 4;               // batches that are gathered, computed and scattered together
 constexpr std::size_t stride = block * lanes;  // floats in a row of them
-
-TISSUE_SIM_INLINE const Quad& quad(const float* p) {
-  return *reinterpret_cast<const Quad*>(p);
-}
-TISSUE_SIM_INLINE Quad& quad(float* p) {
-  return *reinterpret_cast<Quad*>(p);
-}
 
 TISSUE_SIM_INLINE const float* at(const float* vectors, int vertex) {
   return vectors + 4 * static_cast<std::size_t>(vertex);
@@ -35,33 +28,6 @@ TISSUE_SIM_INLINE void edges_of(const NeoHookeanBatch& batch, std::size_t l, con
   e1 = quad(at(displacements, batch.vertices[1][l])) - origin;
   e2 = quad(at(displacements, batch.vertices[2][l])) - origin;
   e3 = quad(at(displacements, batch.vertices[3][l])) - origin;
-}
-
-/// Four vectors into a row each of their x, y and z.
-TISSUE_SIM_INLINE void to_rows(const Quad& a, const Quad& b, const Quad& c, const Quad& d, float* rows) {
-  const Quad ab = TISSUE_SIM_SHUFFLE(a, b, 0, 4, 1, 5);  // ax bx ay by
-  const Quad cd = TISSUE_SIM_SHUFFLE(c, d, 0, 4, 1, 5);
-  quad(rows) = TISSUE_SIM_SHUFFLE(ab, cd, 0, 1, 4, 5);
-  quad(rows + stride) = TISSUE_SIM_SHUFFLE(ab, cd, 2, 3, 6, 7);
-  const Quad abz = TISSUE_SIM_SHUFFLE(a, b, 2, 6, 3, 7);
-  const Quad cdz = TISSUE_SIM_SHUFFLE(c, d, 2, 6, 3, 7);
-  quad(rows + 2 * stride) = TISSUE_SIM_SHUFFLE(abz, cdz, 0, 1, 4, 5);
-}
-
-/// The way back; the fourth component is zero.
-TISSUE_SIM_INLINE void from_rows(const float* rows, Quad& a, Quad& b, Quad& c, Quad& d) {
-  const Quad x = quad(rows);
-  const Quad y = quad(rows + stride);
-  const Quad z = quad(rows + 2 * stride);
-  const Quad zero{};
-  const Quad xy = TISSUE_SIM_SHUFFLE(x, y, 0, 4, 1, 5);  // ax ay bx by
-  const Quad zw = TISSUE_SIM_SHUFFLE(z, zero, 0, 4, 1, 5);
-  a = TISSUE_SIM_SHUFFLE(xy, zw, 0, 1, 4, 5);
-  b = TISSUE_SIM_SHUFFLE(xy, zw, 2, 3, 6, 7);
-  const Quad xy2 = TISSUE_SIM_SHUFFLE(x, y, 2, 6, 3, 7);
-  const Quad zw2 = TISSUE_SIM_SHUFFLE(z, zero, 2, 6, 3, 7);
-  c = TISSUE_SIM_SHUFFLE(xy2, zw2, 0, 1, 4, 5);
-  d = TISSUE_SIM_SHUFFLE(xy2, zw2, 2, 3, 6, 7);
 }
 
 /// Takes the pulls on corners 1 to 3, and what balances them at corner 0, from the forces of the tetrahedron in lane l.
@@ -80,18 +46,18 @@ TISSUE_SIM_INLINE void gather(const NeoHookeanBatch& batch, const float* displac
     edges_of(batch, l + 1, displacements, b1, b2, b3);
     edges_of(batch, l + 2, displacements, c1, c2, c3);
     edges_of(batch, l + 3, displacements, d1, d2, d3);
-    to_rows(a1, b1, c1, d1, rows + l);
-    to_rows(a2, b2, c2, d2, rows + l + 3 * stride);
-    to_rows(a3, b3, c3, d3, rows + l + 6 * stride);
+    to_rows<stride>(a1, b1, c1, d1, rows + l);
+    to_rows<stride>(a2, b2, c2, d2, rows + l + 3 * stride);
+    to_rows<stride>(a3, b3, c3, d3, rows + l + 6 * stride);
   }
 }
 
 TISSUE_SIM_INLINE void scatter(const NeoHookeanBatch& batch, std::size_t count, const float* rows, float* forces) {
   for (std::size_t l = 0; l < count; l += 4) {
     Quad a1, a2, a3, b1, b2, b3, c1, c2, c3, d1, d2, d3;
-    from_rows(rows + l, a1, b1, c1, d1);
-    from_rows(rows + l + 3 * stride, a2, b2, c2, d2);
-    from_rows(rows + l + 6 * stride, a3, b3, c3, d3);
+    from_rows<stride>(rows + l, a1, b1, c1, d1);
+    from_rows<stride>(rows + l + 3 * stride, a2, b2, c2, d2);
+    from_rows<stride>(rows + l + 6 * stride, a3, b3, c3, d3);
     subtract(batch, l, a1, a2, a3, forces);
     if (l + 1 < count) subtract(batch, l + 1, b1, b2, b3, forces);
     if (l + 2 < count) subtract(batch, l + 2, c1, c2, c3, forces);
@@ -116,9 +82,6 @@ TISSUE_SIM_INLINE void store(const Three<Lane>& v, float* row) {
 }
 
 /// Replaces the edges, from lane l on, by the pull of the tissue on corners 1 to 3: the gradient of the energy there.
-/// With H = F - 1 the gradient of the displacements, K its cofactors and C = 1 + tr H - H^T + K those of F,
-///   J - 1 = tr H + tr K + det H,  P = mu (F - C) + L (J - 1) C = mu H + t (K - H^T) + (s + t tr H) 1,
-/// where s = L (J - 1) and t = s - mu. No numbers of size one are subtracted, so a strain of 1e-6 keeps its digits.
 template <class Lane>
 TISSUE_SIM_INLINE void pull(const NeoHookeanBatch& batch, std::size_t l, float* edges) {
   const Lane d[9] = {lane<Lane>(&batch.inverse_rest[0][l]), lane<Lane>(&batch.inverse_rest[1][l]),
@@ -133,22 +96,8 @@ TISSUE_SIM_INLINE void pull(const NeoHookeanBatch& batch, std::size_t l, float* 
   combine(d[0], e1, d[3], e2, d[6], e3, h0);
   combine(d[1], e1, d[4], e2, d[7], e3, h1);
   combine(d[2], e1, d[5], e2, d[8], e3, h2);
-  Three<Lane> k0, k1, k2;
-  cross(h1, h2, k0);
-  cross(h2, h0, k1);
-  cross(h0, h1, k2);
-  const Lane trace = h0.x + h1.y + h2.z;
-  const Lane stretch = trace + (k0.x + k1.y + k2.z) + (h0.x * k0.x + h0.y * k0.y + h0.z * k0.z);
-  const Lane& mu = lane<Lane>(&batch.volume_mu[l]);
-  const Lane s = lane<Lane>(&batch.volume_stiff[l]) * stretch;
-  const Lane t = s - mu;
-  const Lane diagonal = s + t * trace;
-  const Three<Lane> p0{mu * h0.x + t * (k0.x - h0.x) + diagonal, mu * h0.y + t * (k0.y - h1.x),
-                       mu * h0.z + t * (k0.z - h2.x)};
-  const Three<Lane> p1{mu * h1.x + t * (k1.x - h0.y), mu * h1.y + t * (k1.y - h1.y) + diagonal,
-                       mu * h1.z + t * (k1.z - h2.y)};
-  const Three<Lane> p2{mu * h2.x + t * (k2.x - h0.z), mu * h2.y + t * (k2.y - h1.z),
-                       mu * h2.z + t * (k2.z - h2.z) + diagonal};
+  Three<Lane> p0, p1, p2;
+  stress(h0, h1, h2, lane<Lane>(&batch.volume_mu[l]), lane<Lane>(&batch.volume_stiff[l]), p0, p1, p2);
   Three<Lane> f;
   combine(d[0], p0, d[1], p1, d[2], p2, f);
   store(f, edges);

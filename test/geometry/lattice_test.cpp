@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 
 #include "tissue_sim/geometry/primitives.h"
@@ -72,6 +73,37 @@ TEST(Lattice, IsTheSameEveryTime) {
   const Lattice b = cover(block, {}, 0.007);
   EXPECT_EQ(a.mesh.tetrahedra, b.mesh.tetrahedra);
   EXPECT_EQ(a.fill, b.fill);
+}
+
+/// Corner i of a cube lies at the far end of the axes whose bits are set in i, and its tetrahedra go along its edges.
+TEST(Lattice, CubesHaveEveryTetrahedronOnce) {
+  const double edge = 0.009;
+  const Lattice lattice = cover(make_block({0.05, 0.04, 0.03}, {5, 4, 3}), {Vector3(0.1, 0.1, 0.1)}, edge);
+  std::vector<int> seen(lattice.mesh.tetrahedra.size(), 0);
+  for (const LatticeCube& cube : cubes_of(lattice)) {
+    const auto place = [&](int corner) {
+      return lattice.mesh.vertices[static_cast<std::size_t>(cube.corners[corner])];
+    };
+    for (int n = 0; n < 6; ++n) {
+      if (cube.tetrahedra[n] < 0) continue;
+      ++seen[static_cast<std::size_t>(cube.tetrahedra[n])];
+      std::array<int, 4> found = lattice.mesh.tetrahedra[static_cast<std::size_t>(cube.tetrahedra[n])];
+      std::array<int, 4> expected{};
+      const std::array<int, 4> along = corners_along(n);
+      for (std::size_t i = 0; i < 4; ++i) expected[i] = cube.corners[along[i]];
+      std::sort(found.begin(), found.end());
+      std::sort(expected.begin(), expected.end());
+      EXPECT_EQ(found, expected);
+      for (const int corner : along) {
+        Vector3 way = Vector3::Zero();
+        for (int axis = 0; axis < 3; ++axis) {
+          if ((corner >> axis & 1) != 0) way[axis] = cube.mirrored[static_cast<std::size_t>(axis)] ? -edge : edge;
+        }
+        EXPECT_LT((place(corner) - place(0) - way).norm(), 1e-12);
+      }
+    }
+  }
+  for (const int times : seen) EXPECT_EQ(times, 1);
 }
 
 }  // namespace

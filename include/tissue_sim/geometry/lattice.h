@@ -24,6 +24,22 @@ struct Lattice {
 /// there even where the solid fills next to nothing of them. Needs a solid of positive volumes.
 Lattice cover(const TetrahedralMesh& solid, const std::vector<Vector3>& points, double edge);
 
+/// A cube of the lattice, seen from the corner that all of its tetrahedra have: corner i lies at the far end of each
+/// axis a whose bit 1 << a is set in i. Where a corner or a tetrahedron is not there, -1. Tetrahedron n goes along the
+/// cube's edges from corner 0 to corner 7, one axis after the other: n / 2 first, then the lower one of the others if n
+/// is even.
+struct LatticeCube {
+  std::array<int, 8> corners{{-1, -1, -1, -1, -1, -1, -1, -1}};
+  std::array<int, 6> tetrahedra{{-1, -1, -1, -1, -1, -1}};
+  std::array<bool, 3> mirrored{};  ///< per axis: the far end is that of the smaller coordinate
+};
+
+/// The corners along tetrahedron n.
+std::array<int, 4> corners_along(int n);
+
+/// The cubes that have a tetrahedron, in an order in which near ones are near in space.
+std::vector<LatticeCube> cubes_of(const Lattice& lattice);
+
 /// Each point by the tetrahedron of the lattice that holds it: those given to cover() all have one. Throws
 /// std::invalid_argument for a point that has none.
 Embedding embed(const std::vector<Vector3>& points, const Lattice& lattice);

@@ -9,7 +9,7 @@ namespace tissue_sim {
 
 /// What a level needs to wake only a part of it. Never changes.
 struct RegionModel {
-  AabbTree batches;     ///< of the batches of tetrahedra; or of pairs, flaps, triangles, distances; at rest
+  AabbTree batches;     ///< of the batches of tetrahedra or cubes; or of pairs, flaps, triangles, distances; at rest
   FlatLists vertices;   ///< of each batch, every one once
   double radius = 0.0;  ///< m, around what touches an instrument
   double band = 0.0;    ///< m, inside the radius: where the coarser level takes over

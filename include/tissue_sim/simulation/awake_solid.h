@@ -41,6 +41,7 @@ struct AwakeSolid {
   std::size_t corners = 0;          ///< so many have tetrahedra; behind them what only carries the finer level
   std::vector<int> place;           ///< of each vertex of the level among `vertices`, or -1
   NeoHookeanSolid packed;           ///< tetrahedra with a free corner, by places in `vertices`
+  LatticeCubes cubes;               ///< those of a lattice instead
   std::vector<Follower> followers;  ///< one for each of `vertices` that is not free
   std::vector<BandVertex> band;     ///< the outermost of the free ones
   std::vector<Pin> pins;            ///< all of whose corners are awake

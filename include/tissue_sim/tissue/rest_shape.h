@@ -9,6 +9,7 @@
 #include "tissue_sim/tissue/distance.h"
 #include "tissue_sim/tissue/element_chunks.h"
 #include "tissue_sim/tissue/enclosed_volume.h"
+#include "tissue_sim/tissue/lattice_cubes.h"
 #include "tissue_sim/tissue/neo_hookean_batch.h"
 #include "tissue_sim/tissue/volume.h"
 
@@ -44,6 +45,7 @@ struct RestShape {
   std::vector<VolumeElement> volumes;         ///< flaps of a wall, tetrahedra of a solid
   std::vector<NeoHookeanElement> tetrahedra;  ///< `fem`
   NeoHookeanSolid packed;                     ///< the same tetrahedra for the explicit integrator, else empty
+  LatticeCubes cubes;                         ///< those of a lattice, in place of `packed`
   ConstraintBatches constraints;              ///< the same distances, areas and volumes, likewise
   ElementChunks chunks;                       ///< of both, where there are many
   EnclosedVolume enclosed;
