@@ -128,6 +128,7 @@ SurfacePatches build_patches(const std::vector<Vector3>& positions, const std::v
     }
   }
   patches.near.reserve(patches.leaf_of.size());
+  patches.near_triangles.rows.reserve(most_near * SurfacePatches::most_triangles / WideTree::lanes);
   forget(patches);
   return patches;
 }
@@ -179,9 +180,17 @@ void place_around(const OrganSurface& organ, int triangle) {
 void gather_near(const OrganSurface& organ, const TurnedBox& box) {
   SurfacePatches& patches = organ.patches;
   patches.near.clear();
-  for_each_patch_near(organ, box, [&](int patch) { patches.near.push_back(patches.leaf_of[patch]); });
+  for_each_patch_near(organ, box, [&](int patch) { patches.near.push_back(patch); });
   patches.near_box = box;
   patches.near_at = patches.travel;
+  if (patches.near.empty() || patches.near.size() > most_near) return;
+  begin_rows(organ.positions[*patches.vertices.begin(patches.near.front())], patches.near_triangles);
+  for (const int patch : patches.near) {
+    for (const int* t = patches.triangles.begin(patch); t != patches.triangles.end(patch); ++t) {
+      const auto& [a, b, c] = organ.triangles[*t];
+      add_to_rows(*t, organ.positions[a], organ.positions[b], organ.positions[c], patches.near_triangles);
+    }
+  }
 }
 
 ClosestOnMesh closest_on_organ(const OrganSurface& organ, const Vector3& p, double reach, int guess) {
@@ -191,15 +200,9 @@ ClosestOnMesh closest_on_organ(const OrganSurface& organ, const Vector3& p, doub
     for (const int vertex : organ.triangles[guess]) place_vertex(organ, vertex);
     search.look_at(guess);
   }
-  const auto look_through = [&](const SurfacePatches::Node& leaf) {
-    if (search.too_far(leaf.box.squared_distance(p))) return;
-    for (const int* t = patches.triangles.begin(leaf.patch); t != patches.triangles.end(leaf.patch); ++t) {
-      search.look_at_if_near(*t);
-    }
-  };
   if (patches.near_at == patches.travel && patches.near.size() <= most_near &&
       patches.near_box.contains(p, std::sqrt(search.bound))) {
-    for (const int leaf : patches.near) look_through(patches.nodes[leaf]);
+    if (!patches.near.empty()) look_through(patches.near_triangles, search);
     return search.best;
   }
   const auto distance_to = [&](const SurfacePatches::Node& node) {
@@ -225,7 +228,10 @@ ClosestOnMesh closest_on_organ(const OrganSurface& organ, const Vector3& p, doub
       continue;
     }
     fit_patch(organ, node);
-    look_through(node);
+    if (search.too_far(node.box.squared_distance(p))) continue;
+    for (const int* t = patches.triangles.begin(node.patch); t != patches.triangles.end(node.patch); ++t) {
+      search.look_at_if_near(*t);
+    }
   }
   return search.best;
 }

@@ -165,6 +165,15 @@ void clear(WideTree::Node& node) {
   node.leaf_children = 0;
 }
 
+void set_lane(const Box& box, int child, std::size_t l, WideTree::Node& node) {
+  for (int axis = 0; axis < 3; ++axis) {
+    node.lower[static_cast<std::size_t>(axis)][l] = static_cast<float>(box.lower[axis]);
+    node.upper[static_cast<std::size_t>(axis)][l] = static_cast<float>(box.upper[axis]);
+  }
+  node.child[l] = child;
+  node.children = std::max(node.children, static_cast<int>(l) + 1);
+}
+
 /// Lists the leaves near to a box.
 template <class Lane>
 TISSUE_SIM_INLINE void gather_leaves(const WideTree& tree, const FloatPoint& lower, const FloatPoint& upper,
@@ -520,6 +529,31 @@ TISSUE_SIM_INLINE void closest(const WideTree& tree, const Vector3& from, Closes
 }
 
 template <class Lane>
+TISSUE_SIM_INLINE void look_through_rows(const BoxRows& boxes, ClosestSearch& search) {
+  const FloatPoint p = to_float(search.p - boxes.origin);
+  const float size = boxes.farthest + std::max({std::abs(p[0]), std::abs(p[1]), std::abs(p[2])});
+  const float slack = 8.0F * rounding * size;
+  float enough = rounded_up(search.bound);
+  for (const WideTree::Node& row : boxes.rows) {
+    alignas(32) WideTree::Row distances;
+    for (unsigned near = squared_distances<Lane>(row, p, slack, enough, distances); near != 0; near &= near - 1) {
+      const auto l = static_cast<std::size_t>(__builtin_ctz(near));
+      if (!(distances[l] <= enough)) continue;
+      search.look_at(row.child[l]);
+      enough = rounded_up(search.bound);
+    }
+  }
+}
+__attribute__((noinline)) void look_through_narrow(const BoxRows& boxes, ClosestSearch& search) {
+  look_through_rows<Four>(boxes, search);
+}
+#ifdef __x86_64__
+__attribute__((target("avx2"))) void look_through_wide(const BoxRows& boxes, ClosestSearch& search) {
+  look_through_rows<Eight>(boxes, search);
+}
+#endif
+
+template <class Lane>
 TISSUE_SIM_INLINE void closest(const WideTree& tree, const Vector3& from, ClosestSearch& search) {
   closest<Lane>(
       tree, from, search, [&]() __attribute__((always_inline)) { return search.bound; });
@@ -672,13 +706,7 @@ struct Builder {
   }
 
   void set_lane(int index, std::size_t l, const Box& box, int child) {
-    WideTree::Node& node = tree.nodes[static_cast<std::size_t>(index)];
-    for (int axis = 0; axis < 3; ++axis) {
-      node.lower[static_cast<std::size_t>(axis)][l] = static_cast<float>(box.lower[axis]);
-      node.upper[static_cast<std::size_t>(axis)][l] = static_cast<float>(box.upper[axis]);
-    }
-    node.child[l] = child;
-    node.children = std::max(node.children, static_cast<int>(l) + 1);
+    tissue_sim::set_lane(box, child, l, tree.nodes[static_cast<std::size_t>(index)]);
   }
 };
 
@@ -693,6 +721,33 @@ WideTree build_wide_tree(const std::vector<Vector3>& vertices, const std::vector
   clear(tree.nodes.front());
   if (!triangles.empty()) builder.build_node(0, 0, static_cast<int>(triangles.size()), 1);
   return tree;
+}
+
+void begin_rows(const Vector3& origin, BoxRows& boxes) {
+  boxes.rows.clear();
+  boxes.origin = origin;
+  boxes.farthest = 0.0F;
+}
+
+void add_to_rows(int triangle, const Vector3& a, const Vector3& b, const Vector3& c, BoxRows& boxes) {
+  if (boxes.rows.empty() || boxes.rows.back().children == static_cast<int>(lanes)) {
+    boxes.rows.emplace_back();
+    clear(boxes.rows.back());
+  }
+  Box box;
+  for (const Vector3* corner : {&a, &b, &c}) {
+    const Vector3 from_origin = *corner - boxes.origin;
+    box.add(from_origin);
+    boxes.farthest = std::max(boxes.farthest, static_cast<float>(from_origin.lpNorm<Eigen::Infinity>()));
+  }
+  set_lane(box, triangle, static_cast<std::size_t>(boxes.rows.back().children), boxes.rows.back());
+}
+
+void look_through(const BoxRows& boxes, ClosestSearch& search, InstructionSet set) {
+#ifdef __x86_64__
+  if (set != InstructionSet::baseline) return look_through_wide(boxes, search);
+#endif
+  look_through_narrow(boxes, search);
 }
 
 void find_crossing_pairs(const WideTree& tree, const NearEdges& edges, WideTreeRoom& room,

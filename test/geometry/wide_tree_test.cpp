@@ -217,6 +217,12 @@ TEST(WideTree, ClosestPointIsThatOfBruteForceToTheBit) {
                               : round % 3 == 1 ? make_octasphere(0.02, 3)
                                                : make_grid_box(Vector3::Constant(0.02), 5);
     const WideTree tree = build_wide_tree(mesh.vertices, mesh.triangles);
+    BoxRows boxes;
+    begin_rows(mesh.vertices.front(), boxes);
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+      const auto corner = [&](std::size_t i) { return mesh.vertices[static_cast<std::size_t>(mesh.triangles[t][i])]; };
+      add_to_rows(static_cast<int>(t), corner(0), corner(1), corner(2), boxes);
+    }
     const double size = bounds_of(mesh.vertices).size().maxCoeff();
     for (int i = 0; i < 60; ++i) {
       const Vector3 on = mesh.vertices[static_cast<std::size_t>(random()) % mesh.vertices.size()];
@@ -231,6 +237,10 @@ TEST(WideTree, ClosestPointIsThatOfBruteForceToTheBit) {
           EXPECT_EQ(closest.squared_distance, plain.best.squared_distance);
           EXPECT_EQ(closest.on.point, plain.best.on.point);
         }
+        ClosestSearch among_rows(mesh.vertices, mesh.triangles, p, reach);
+        look_through(boxes, among_rows, set);
+        ASSERT_EQ(among_rows.best.triangle, plain.best.triangle);
+        EXPECT_EQ(among_rows.best.on.point, plain.best.on.point);
       }
     }
   }

@@ -4,6 +4,7 @@
 #include "tissue_sim/geometry/closest_point.h"
 #include "tissue_sim/geometry/triangle_mesh.h"
 #include "tissue_sim/geometry/turned_box.h"
+#include "tissue_sim/geometry/wide_tree.h"
 
 namespace tissue_sim {
 
@@ -32,7 +33,8 @@ struct SurfacePatches {
   std::vector<Node> nodes;    ///< depth first: every child stands after its parent
   double travel = 0.0;        ///< m; whoever moves vertices adds the farthest way of one
 
-  std::vector<int> near;  ///< nodes: the leaves that overlap near_box, while travel is near_at
+  std::vector<int> near;   ///< patches that overlap near_box, while travel is near_at
+  BoxRows near_triangles;  ///< theirs, unless they are too many to be looked through
   TurnedBox near_box = {Box(), Pose()};
   double near_at = -1e300;  ///< m
 };

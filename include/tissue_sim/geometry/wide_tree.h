@@ -10,7 +10,8 @@
 
 namespace tissue_sim {
 
-/// A point in single precision, rounded; the fourth number is nothing. Read and written as one register, wherever it is.
+/// A point in single precision, rounded; the fourth number is nothing. Read and written as one register, wherever it
+/// is.
 struct alignas(16) FloatPoint : std::array<float, 4> {};
 
 inline FloatPoint to_float(const Vector3& p) {
@@ -49,6 +50,22 @@ struct WideTree {
 };
 
 WideTree build_wide_tree(const std::vector<Vector3>& vertices, const std::vector<Triangle>& triangles);
+
+/// Boxes of triangles that are all near, eight side by side: a search looks through them from one end to the other.
+struct BoxRows {
+  std::vector<WideTree::Node> rows;  ///< of which only boxes and children count: the triangles
+  Vector3 origin = Vector3::Zero();  ///< m, what the boxes are measured from, so that floats keep their digits
+  float farthest = 0.0F;             ///< m, the largest coordinate from there
+};
+
+/// Empties the rows.
+void begin_rows(const Vector3& origin, BoxRows& boxes);
+
+/// Adds the box of a triangle.
+void add_to_rows(int triangle, const Vector3& a, const Vector3& b, const Vector3& c, BoxRows& boxes);
+
+/// Looks at every triangle that can be nearer than what the search knows.
+void look_through(const BoxRows& boxes, ClosestSearch& search, InstructionSet set = instruction_set());
 
 /// An edge and a triangle that may cross.
 struct EdgeTrianglePair {
