@@ -32,7 +32,7 @@ struct Path {
     weights = {1.0 - first, first - second, second - third, third};
   }
 
-  /// 0 to 5, one an order of the axes.
+  /// 0 to 5, one an order of the axes: that of axes_along().
   int number() const { return 2 * axes[0] + (axes[1] > axes[2] ? 1 : 0); }
 };
 
@@ -56,14 +56,6 @@ bool is_swapped(const std::array<int, 3>& cube, const std::array<int, 3>& axes) 
   const int mirrored = cube[0] + cube[1] + cube[2];
   const bool odd_path = axes[1] != (axes[0] + 1) % 3;
   return (mirrored % 2 != 0) != odd_path;
-}
-
-/// As Path::number() counts them.
-std::array<int, 3> axes_of(int number) {
-  const int first = number / 2;
-  const int lower = first == 0 ? 1 : 0;
-  const int upper = first == 2 ? 1 : 2;
-  return number % 2 == 0 ? std::array<int, 3>{first, lower, upper} : std::array<int, 3>{first, upper, lower};
 }
 
 /// The bits of the three numbers in turns: cubes that follow each other by it lie close together.
@@ -211,11 +203,6 @@ Lattice cover(const TetrahedralMesh& solid, const std::vector<Vector3>& points, 
   return lattice;
 }
 
-std::array<int, 4> corners_along(int n) {
-  const std::array<int, 3> axes = axes_of(n);
-  return {0, 1 << axes[0], 7 - (1 << axes[2]), 7};
-}
-
 std::vector<LatticeCube> cubes_of(const Lattice& lattice) {
   struct Numbered {
     std::uint64_t key;
@@ -235,7 +222,7 @@ std::vector<LatticeCube> cubes_of(const Lattice& lattice) {
           any = true;
           cube.tetrahedra[n] = t;
           Tetrahedron along = lattice.mesh.tetrahedra[t];
-          if (is_swapped(at, axes_of(n))) std::swap(along[2], along[3]);
+          if (is_swapped(at, axes_along(n))) std::swap(along[2], along[3]);
           const std::array<int, 4> corners = corners_along(n);
           for (std::size_t i = 0; i < 4; ++i) cube.corners[corners[i]] = along[i];
         }

@@ -47,14 +47,12 @@ struct CubeEdges {
     }
   }
 
-  /// The corner from which tetrahedron n (see LatticeCube) goes along the axis.
+  /// The corner from which tetrahedron n goes along the axis.
   static constexpr std::size_t start(std::size_t n, std::size_t axis) {
-    const std::size_t first = n / 2;
-    const std::size_t lower = first == 0 ? 1 : 0;
-    const std::size_t upper = first == 2 ? 1 : 2;
-    const std::size_t second = n % 2 == 0 ? lower : upper;
-    if (axis == first) return 0;
-    return axis == second ? std::size_t{1} << first : std::size_t{7} - (std::size_t{1} << axis);
+    const int number = static_cast<int>(n);
+    std::size_t i = 0;
+    while (axes_along(number)[i] != static_cast<int>(axis)) ++i;
+    return static_cast<std::size_t>(corners_along(number)[i]);
   }
 };
 constexpr CubeEdges cube_edges;

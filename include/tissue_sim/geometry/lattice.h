@@ -34,8 +34,16 @@ struct LatticeCube {
   std::array<bool, 3> mirrored{};  ///< per axis: the far end is that of the smaller coordinate
 };
 
-/// The corners along tetrahedron n.
-std::array<int, 4> corners_along(int n);
+/// The axes that tetrahedron n goes along, one after the other, and the corners that it comes by.
+constexpr std::array<int, 3> axes_along(int n) {
+  const int first = n / 2;
+  const int lower = first == 0 ? 1 : 0;
+  const int upper = first == 2 ? 1 : 2;
+  return {first, n % 2 == 0 ? lower : upper, n % 2 == 0 ? upper : lower};
+}
+constexpr std::array<int, 4> corners_along(int n) {
+  return {0, 1 << axes_along(n)[0], 7 - (1 << axes_along(n)[2]), 7};
+}
 
 /// The cubes that have a tetrahedron, in an order in which near ones are near in space.
 std::vector<LatticeCube> cubes_of(const Lattice& lattice);
