@@ -12,7 +12,7 @@
 #include "tissue_sim/geometry/pose.h"
 #include "tissue_sim/geometry/primitives.h"
 
-namespace tissue_sim {
+namespace tissue_sim::lattice_cubes_test {
 namespace {
 
 using Vectors = NeoHookeanElement::Vectors;
@@ -158,4 +158,4 @@ TEST(LatticeCubes, ABadDisplacementSpoilsItsOwnCubesOnly) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
+}  // namespace tissue_sim::lattice_cubes_test
