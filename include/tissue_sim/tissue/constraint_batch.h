@@ -119,8 +119,9 @@ struct ConstraintRanges {
 ///
 /// On a Zen 4 core a sphere of 8,064 triangles takes 5.7, 3.7 and 3.3 ns an element with the three instruction sets,
 /// a stomach of 20,000 6.3, 4.1 and 3.7; one by one in double it is 21. All flaps and all triangles by themselves took
-/// 5.2 where this takes 3.7; registers of 64 bytes took as long as 32. Lanes that are far from each other, so that no
-/// vertex is added to twice in a row, would gain 3 to 10 %, but spread a small part of an organ over many batches.
+/// 5.2 where this takes 3.7; registers of 64 bytes took as long as 32, on a Zen 5 core too. Lanes that are far from
+/// each other, so that no vertex is added to twice in a row, would gain 3 to 10 %, but spread a small part of an organ
+/// over many batches.
 void add_constraint_forces(const ConstraintBatches& batches, const VertexMotion* motions, VertexPull* pulls,
                            EnclosedShare* shares, InstructionSet set = instruction_set());
 
