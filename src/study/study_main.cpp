@@ -109,6 +109,7 @@ void run_cases(const Arguments& arguments, const std::string& config,
 
 bool run(const std::vector<std::string>& words) {
   std::vector<char*> pointers;
+  pointers.reserve(words.size() + 1);
   for (const std::string& word : words) pointers.push_back(const_cast<char*>(word.c_str()));
   pointers.push_back(nullptr);
   const pid_t child = fork();
