@@ -146,8 +146,9 @@ void gather(const RegionModel& model, const RestShape& shape, const Embedding& p
   awake.made_from = region.centres;
   make_room(2 * region.free.size(), awake.vertices);
   make_room(region.free.size(), awake.band);
-  shape.cubes.cubes > 0 ? make_room(room.batches.size(), awake.cubes.batches)
-                        : make_room(room.batches.size(), awake.packed.batches);
+  const bool is_lattice = shape.cubes.cubes > 0;
+  make_room(is_lattice ? room.batches.size() : 0, awake.cubes.batches);
+  make_room(is_lattice ? 0 : room.batches.size(), awake.packed.batches);
   awake.free = region.free.size();
   for (const int v : region.free) {
     const int place = place_of(v, awake);
@@ -160,13 +161,13 @@ void gather(const RegionModel& model, const RestShape& shape, const Embedding& p
     band.damping = 2.0 * band_damping * std::sqrt(band.stiffness * band.mass);
   }
   for (const int b : room.batches) {
-    const auto before = static_cast<std::size_t>(b);
-    if (shape.cubes.cubes > 0) {
-      const std::size_t count = std::min(CubeBatch::lanes, shape.cubes.cubes - CubeBatch::lanes * before);
-      for (std::size_t l = 0; l < count; ++l) gather_cube(shape.cubes.batches[b], l, region, awake);
+    const auto batch = static_cast<std::size_t>(b);
+    if (is_lattice) {
+      const std::size_t count = std::min(CubeBatch::lanes, shape.cubes.cubes - CubeBatch::lanes * batch);
+      for (std::size_t l = 0; l < count; ++l) gather_cube(shape.cubes.batches[batch], l, region, awake);
     } else {
-      const std::size_t count = std::min(lanes, shape.packed.tetrahedra - lanes * before);
-      gather_tetrahedra(shape.packed.batches[b], count, region, awake);
+      const std::size_t count = std::min(lanes, shape.packed.tetrahedra - lanes * batch);
+      gather_tetrahedra(shape.packed.batches[batch], count, region, awake);
     }
   }
   fill_last(awake.packed);
