@@ -10,7 +10,7 @@ namespace tissue_sim {
 namespace {
 
 /// Samples across the edge of a cube, at least: what a tetrahedron holds is counted by points of equal volume.
-constexpr double samples_across = 6.0;
+constexpr double samples_across = 4.0;
 
 /// The samples of a full tetrahedron come to within a tenth of its volume.
 constexpr double counted_full = 0.9;
@@ -18,22 +18,24 @@ constexpr double counted_full = 0.9;
 /// Three coordinates of the unit cube in descending order, and which axes they belong to: that order is the path along
 /// the cube's edges from its first corner to its last, and so its tetrahedron.
 struct Path {
-  std::array<int, 3> axes{{0, 1, 2}};
-  std::array<double, 4> weights{};  ///< of the four corners along the path
+  std::array<int, 3> axes;
+  std::array<double, 4> weights;  ///< of the four corners along the path
 
-  explicit Path(const Vector3& inside) {
-    // Equal ones stay in order. Not std::stable_sort, which takes room from the heap for each three.
-    if (inside[1] > inside[0]) std::swap(axes[0], axes[1]);
-    if (inside[2] > inside[axes[1]]) std::swap(axes[1], axes[2]);
-    if (inside[axes[1]] > inside[axes[0]]) std::swap(axes[0], axes[1]);
+  explicit Path(const Vector3& inside) : axes(axes_along(number(inside))) {
     const double first = inside[axes[0]];
     const double second = inside[axes[1]];
     const double third = inside[axes[2]];
     weights = {1.0 - first, first - second, second - third, third};
   }
 
-  /// 0 to 5, one an order of the axes: that of axes_along().
-  int number() const { return 2 * axes[0] + (axes[1] > axes[2] ? 1 : 0); }
+  /// 0 to 5, one an order of the axes: that of axes_along(). Equal coordinates stay in order.
+  static int number(const Vector3& inside) {
+    constexpr std::array<int, 8> by_comparisons = {0, 2, 1, -1, -1, 3, 4, 5};
+    const int y_first = inside[1] > inside[0] ? 1 : 0;
+    const int z_before_y = inside[2] > inside[1] ? 2 : 0;
+    const int z_before_x = inside[2] > inside[0] ? 4 : 0;
+    return by_comparisons[static_cast<std::size_t>(y_first + z_before_y + z_before_x)];
+  }
 };
 
 struct Grid {
@@ -69,32 +71,29 @@ std::uint64_t interleaved(const std::array<int, 3>& cube) {
   return bits;
 }
 
-/// Where in the grid a point is: its cube, and the tetrahedron of it by the path.
+/// Where in the grid a point is: its cube, and where in it.
 struct Place {
-  std::array<int, 3> cube{};
-  Path path;
+  std::array<int, 3> cube;
+  Vector3 inside;  ///< of the unit cube, mirrored as the cube is
 
   static Place of(const Vector3& p, const Grid& grid) {
     const Vector3 scaled = (p - grid.origin) / grid.edge;
-    std::array<int, 3> cube{};
-    Vector3 inside;
+    Place place;
     for (int axis = 0; axis < 3; ++axis) {
       const auto a = static_cast<std::size_t>(axis);
-      cube[a] = std::clamp(static_cast<int>(std::floor(scaled[axis])), 0, grid.cells[a] - 1);
-      const double along = scaled[axis] - cube[a];
-      inside[axis] = cube[a] % 2 == 0 ? along : 1.0 - along;  // mirrored
+      place.cube[a] = std::clamp(static_cast<int>(scaled[axis]), 0, grid.cells[a] - 1);
+      const double along = scaled[axis] - place.cube[a];
+      place.inside[axis] = place.cube[a] % 2 == 0 ? along : 1.0 - along;
     }
-    return {cube, Path(inside)};
+    return place;
   }
 
   std::size_t tetrahedron(const Grid& grid) const {
-    return 6 * static_cast<std::size_t>(grid.cube(cube)) + static_cast<std::size_t>(path.number());
+    return 6 * static_cast<std::size_t>(grid.cube(cube)) + static_cast<std::size_t>(Path::number(inside));
   }
 
-  bool swapped() const { return is_swapped(cube, path.axes); }
-
   /// The grid points along the path.
-  std::array<std::array<int, 3>, 4> corners() const {
+  std::array<std::array<int, 3>, 4> corners(const Path& path) const {
     std::array<std::array<int, 3>, 4> along;
     std::array<int, 3> at = cube;
     for (std::size_t axis = 0; axis < 3; ++axis) at[axis] += cube[axis] % 2;
@@ -167,7 +166,8 @@ Lattice cover(const TetrahedralMesh& solid, const std::vector<Vector3>& points, 
     if (number >= 0) return number;
     number = static_cast<int>(lattice.mesh.tetrahedra.size());
     Tetrahedron corners{};
-    const auto along = place.corners();
+    const Path path(place.inside);
+    const auto along = place.corners(path);
     for (std::size_t i = 0; i < 4; ++i) {
       int& node = node_of[static_cast<std::size_t>(grid.corner(along[i]))];
       if (node < 0) {
@@ -176,7 +176,7 @@ Lattice cover(const TetrahedralMesh& solid, const std::vector<Vector3>& points, 
       }
       corners[i] = node;
     }
-    if (place.swapped()) std::swap(corners[2], corners[3]);
+    if (is_swapped(place.cube, path.axes)) std::swap(corners[2], corners[3]);
     lattice.mesh.tetrahedra.push_back(corners);
     lattice.fill.push_back(0.0);
     return number;
@@ -248,8 +248,9 @@ Embedding embed(const std::vector<Vector3>& points, const Lattice& lattice) {
     const int number = lattice.tetrahedra[place.tetrahedron(grid)];
     if (number < 0) throw std::invalid_argument("embed: a point lies in no tetrahedron of the lattice");
     embedding.corners.push_back(lattice.mesh.tetrahedra[number]);
-    embedding.weights.push_back(place.path.weights);
-    if (place.swapped()) std::swap(embedding.weights.back()[2], embedding.weights.back()[3]);
+    const Path path(place.inside);
+    embedding.weights.push_back(path.weights);
+    if (is_swapped(place.cube, path.axes)) std::swap(embedding.weights.back()[2], embedding.weights.back()[3]);
   }
   return embedding;
 }
