@@ -87,8 +87,7 @@ std::vector<int> sharper_than(const InstrumentSurface& surface, double radius) {
   return vertices;
 }
 
-ClosestFeature closest_feature(const InstrumentSurface& surface, const Vector3& p, double reach, int guess) {
-  const ClosestOnMesh closest = closest_on_mesh(surface.vertices, surface.triangles, surface.tree, p, reach, guess);
+ClosestFeature feature_at(const InstrumentSurface& surface, const Vector3& p, const ClosestOnMesh& closest) {
   if (closest.triangle < 0) return {p, Vector3::UnitZ(), -std::numeric_limits<double>::max(), -1};
   const Vector3 normal = normal_at(surface, closest.triangle, closest.on.feature);
   const Vector3 way_out = closest.on.point - p;
@@ -97,6 +96,11 @@ ClosestFeature closest_feature(const InstrumentSurface& surface, const Vector3& 
   if (distance < on_surface) return {closest.on.point, normal, inside ? distance : -distance, closest.triangle};
   if (inside) return {closest.on.point, way_out / distance, distance, closest.triangle};
   return {closest.on.point, -way_out / distance, -distance, closest.triangle};
+}
+
+ClosestFeature closest_feature(const InstrumentSurface& surface, const Vector3& p, double reach, int guess) {
+  return feature_at(surface, p,
+                    closest_on_mesh(surface.vertices, surface.triangles, surface.tree, p, reach, guess));
 }
 
 }  // namespace tissue_sim

@@ -1,9 +1,12 @@
 #include "benchmark/plain_step.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <numeric>
+#include <utility>
 
 #include "tissue_sim/contact/contact_point.h"
 #include "tissue_sim/geometry/edge_triangle.h"
@@ -71,6 +74,23 @@ void PlainTree::build(const std::vector<Box>& boxes) {
   std::iota(items.begin(), items.end(), 0);
   build_node(boxes, items, 0, static_cast<int>(items.size()), *this);
   refit(boxes);
+}
+
+void PlainTree::search(ClosestSearch& closest, int node) const {
+  const Node& here = nodes[node];
+  if (here.item >= 0) {
+    closest.look_at(here.item);
+    return;
+  }
+  std::array<std::pair<double, int>, 2> below;  // squared distance, node
+  for (std::size_t i = 0; i < 2; ++i) {
+    const int child = i == 0 ? here.left : here.right;
+    below[i] = {nodes[child].box.squared_distance(closest.p), child};
+  }
+  if (below[1].first < below[0].first) std::swap(below[0], below[1]);
+  for (const auto& [distance, child] : below) {
+    if (!closest.too_far(distance)) search(closest, child);
+  }
 }
 
 void PlainTree::refit(const std::vector<Box>& boxes) {
@@ -200,7 +220,7 @@ void PlainSimulation::label_border() {
   }
   border_.assign(positions.size(), 0);
   for (std::size_t v = 0; v < positions.size(); ++v) {
-    if (contradicted[v]) side_[v] = closest_feature(instrument_, local_[v]).depth > 0.0 ? 1 : -1;
+    if (contradicted[v]) side_[v] = closest_to(static_cast<int>(v)).depth > 0.0 ? 1 : -1;
     border_[v] = side_[v] == 1 ? 1 : 0;
   }
 }
@@ -231,7 +251,7 @@ void PlainSimulation::flood() {
   };
   spread();
   for (const int root : rest_.component_roots) {  // a surface that lies wholly inside has no crossing
-    if (side_[root] != 0 || !(closest_feature(instrument_, local_[root]).depth > 0.0)) continue;
+    if (side_[root] != 0 || !(closest_to(root).depth > 0.0)) continue;
     side_[root] = 1;
     stack.push_back(root);
     spread();
@@ -239,7 +259,7 @@ void PlainSimulation::flood() {
 
   colliding.clear();
   for (std::size_t v = 0; v < positions.size(); ++v) {
-    if (!consistent) side_[v] = closest_feature(instrument_, local_[v]).depth > 0.0 ? 1 : -1;
+    if (!consistent) side_[v] = closest_to(static_cast<int>(v)).depth > 0.0 ? 1 : -1;
     if (side_[v] == 1) colliding.push_back(static_cast<int>(v));
   }
 }
@@ -325,8 +345,15 @@ void PlainSimulation::propagate_depths() {
   }
 }
 
+ClosestFeature PlainSimulation::closest_to(int vertex) const {
+  constexpr double anywhere = std::numeric_limits<double>::infinity();
+  ClosestSearch closest(instrument_.vertices, instrument_.triangles, local_[vertex], anywhere);
+  instrument_tree_.search(closest);
+  return feature_at(instrument_, local_[vertex], closest.best);
+}
+
 void PlainSimulation::take_closest_feature(int vertex) {
-  const ClosestFeature closest = closest_feature(instrument_, local_[vertex]);
+  const ClosestFeature closest = closest_to(vertex);
   depth_[vertex] = std::max(0.0, closest.depth);
   direction_[vertex] = closest.direction;
 }
@@ -346,7 +373,7 @@ void PlainSimulation::respond(const Pose& before, const Pose& now, double dt) {
   }
   for (const int vertex : touching) {
     if (side_[vertex] == 1) continue;
-    const ClosestFeature closest = closest_feature(instrument_, local_[vertex]);
+    const ClosestFeature closest = closest_to(vertex);
     if (!(std::abs(closest.depth) < contact_margin)) continue;
     add(vertex, now.orientation * closest.direction, now.apply(closest.point));
   }

@@ -11,8 +11,9 @@ namespace tissue_sim {
 
 /// The paper's step as a textbook would write it, one organ against one rigid piece of an instrument, one substep a
 /// step: what the fast step is compared with, for its answers and for its time. It shares the formulas with the fast
-/// one (what is known of the organ at rest, each element's C and gradient, edge against triangle, the closest feature)
-/// and none of its loops: every vertex is carried over, every tree refitted and every element evaluated in every step.
+/// one (what is known of the organ at rest, each element's C and gradient, edge against triangle, the closest point of a
+/// triangle) and none of its loops: every vertex is carried over, every tree refitted and every element evaluated in
+/// every step.
 
 /// A binary tree of boxes, one item a leaf.
 struct PlainTree {
@@ -26,6 +27,9 @@ struct PlainTree {
 
   void build(const std::vector<Box>& boxes);
   void refit(const std::vector<Box>& boxes);
+
+  /// Looks at the items below `node` for the one nearest to a point, those in the nearer box first.
+  void search(ClosestSearch& closest, int node = 0) const;
 };
 
 /// Where an organ edge goes through an instrument triangle. Tip frame.
@@ -72,6 +76,7 @@ class PlainSimulation {
   void flood();
   void find_border_depths();
   void propagate_depths();
+  ClosestFeature closest_to(int vertex) const;
   void take_closest_feature(int vertex);
   void respond(const Pose& before, const Pose& now, double dt);
   void integrate(double dt);

@@ -45,9 +45,13 @@ struct ClosestFeature {
   int triangle = -1;  ///< that has the point
 };
 
-/// Exact depth and direction of p (tip frame). The sign is that of the pseudonormal at the closest feature; where p
-/// lies on the surface the direction is that normal. A position that is not a number is outside, far away, and so is
-/// what is farther than `reach` (m) from the surface. `guess` is a triangle that may well be the closest, or -1: it
+/// Depth and direction of p (tip frame) by the point of the surface nearest to it, which somebody has found. The sign is that
+/// of the pseudonormal there; where p lies on the surface the direction is that normal. Where nothing was found p is
+/// outside, far away.
+ClosestFeature feature_at(const InstrumentSurface& surface, const Vector3& p, const ClosestOnMesh& closest);
+
+/// Exact depth and direction of p (tip frame). A position that is not a number is outside, far away, and so is what is
+/// farther than `reach` (m) from the surface. `guess` is a triangle that may well be the closest, or -1: it
 /// changes how long the search takes and not what it finds.
 ClosestFeature closest_feature(const InstrumentSurface& surface, const Vector3& p,
                                double reach = std::numeric_limits<double>::infinity(), int guess = -1);
