@@ -113,13 +113,19 @@ std::size_t place_of_piece(const ContactPoint& point, const RestShape& rest) {
   return static_cast<std::size_t>(point.piece) * count_places(rest) + place_of(point, rest);
 }
 
+/// None of the step so far.
+void begin_contacts(OrganWorkspace& work) {
+  work.contacts.clear();
+  ++work.round;
+}
+
 /// Adds what a substep has found at a contact point to the contact that the step reports there.
 void record_contact(StepContext& context, const ContactPoint& point) {
   OrganWorkspace& work = context.work();
   const RestShape& rest = context.model().rest;
   const std::size_t place = place_of_piece(point, rest);
-  if (work.contact_step[place] != context.report.step) {
-    work.contact_step[place] = context.report.step;
+  if (work.contact_round[place] != work.round) {
+    work.contact_round[place] = work.round;
     work.contact_of[place] = static_cast<int>(work.contacts.size());
     work.contacts.emplace_back();
     work.contacts.back().force.setZero();
@@ -233,7 +239,7 @@ void put_last_good_back(StepContext& context) {
   OrganWorkspace& work = context.work();
   if (++work.bad_steps > most_bad_steps) work.last_good = rest_state(context.world, context.organ);
   recover(context.model(), work.last_good, context.state);
-  work.contacts.clear();
+  begin_contacts(work);
   forget(work);
   context.report.recovered = true;
 }
@@ -299,7 +305,7 @@ Workspace build_workspace(const World& world, int threads) {
     work.points.reserve(usual_contacts);
     work.bearers.reserve(Bearers::most * usual_contacts);
     work.contacts.reserve(usual_contacts);
-    work.contact_step.assign(places, 0);
+    work.contact_round.assign(places, 0);
     work.last_good = rest_state(world, static_cast<int>(organ));
     forget(work);
   }
@@ -326,7 +332,7 @@ void begin_report(const World& world, const Motion& motion, StepReport& report) 
 }
 
 int count_substeps(StepContext& context) {
-  context.work().contacts.clear();
+  begin_contacts(context.work());
   context.slept = context.state.asleep;
   for (std::size_t i = 0; i < context.motion.instruments.size(); ++i) {
     context.workspace.now[i] = context.motion.instruments[i].from;

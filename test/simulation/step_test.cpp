@@ -36,6 +36,20 @@ TEST(Step, TwoRunsGiveTheSameBits) {
   EXPECT_NE(hash(pressed_sphere(0.008, 60)), hash(pressed_sphere(0.0081, 60)));
 }
 
+TEST(Step, ReportsItsOwnContactsThoughNobodyCountsTheSteps) {
+  Simulation counted = pressed_sphere(0.006, 40);
+  Simulation uncounted = pressed_sphere(0.006, 40);
+  for (int i = 0; i < 10; ++i) {
+    const Pose deeper = ball_at(0.006 + 0.00015 * (i + 1));
+    counted.go_to(deeper);
+    --uncounted.report.step;  // go_to() raises it
+    uncounted.go_to(deeper);
+    ASSERT_EQ(uncounted.report.contacts.size(), counted.report.contacts.size());
+  }
+  EXPECT_GT(counted.report.contacts.size(), 0u);
+  EXPECT_EQ(hash(uncounted), hash(counted));
+}
+
 TEST(Step, ACopiedStateGoesOnTheSameWay) {
   Simulation simulation = pressed_sphere(0.006, 40);
   const State snapshot = simulation.state;

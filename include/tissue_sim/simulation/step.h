@@ -46,8 +46,9 @@ struct OrganWorkspace {
   std::uint64_t turn = 0;  ///< of the vertices that the health check looks at
 
   std::vector<OrganContact> contacts;  ///< of the step, one a place that was pressed in any of its substeps
-  std::vector<int> contact_of;         ///< per place, into contacts, where contact_step is the current one
-  std::vector<std::uint64_t> contact_step;
+  std::vector<int> contact_of;         ///< per place, into contacts, where contact_round is the current one
+  std::vector<std::uint64_t> contact_round;
+  std::uint64_t round = 0;  ///< of contacts: one a step
 };
 
 struct Workspace {
