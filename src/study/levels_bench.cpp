@@ -197,8 +197,9 @@ bool bench_levels(BenchWords& words, JsonRows& json) {
   const OrganModel& model = levels.world.organs.front();
   std::printf(
       "The bundled liver as a solid, edges of 2 mm near the contact; the bundled probe (3 mm) 5 mm deep, then 20 mm at "
-      "50 mm/s, 1 kHz.\nWith levels, tolerance 5 %%, and with everything awake, 50 steps in turn; one core, time of "
-      "the processor\n\n");
+      "50 mm/s, 1 kHz.\nWith levels, tolerance %g %%, and with everything awake, %d steps in turn; one core, time of "
+      "the processor\n\n",
+      100.0 * tolerance, a_turn);
   print_levels(model);
   if (model.levels.empty()) {
     std::printf("A region would be most of the organ: there are no levels\n");
