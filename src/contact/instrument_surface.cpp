@@ -99,8 +99,7 @@ ClosestFeature feature_at(const InstrumentSurface& surface, const Vector3& p, co
 }
 
 ClosestFeature closest_feature(const InstrumentSurface& surface, const Vector3& p, double reach, int guess) {
-  return feature_at(surface, p,
-                    closest_on_mesh(surface.vertices, surface.triangles, surface.tree, p, reach, guess));
+  return feature_at(surface, p, closest_on_mesh(surface.vertices, surface.triangles, surface.tree, p, reach, guess));
 }
 
 }  // namespace tissue_sim

@@ -30,7 +30,7 @@ struct Path {
 
   /// 0 to 5, one an order of the axes: that of axes_along(). Equal coordinates stay in order.
   static int number(const Vector3& inside) {
-    constexpr std::array<int, 8> by_comparisons = {0, 2, 1, -1, -1, 3, 4, 5};
+    constexpr std::array<int, 8> by_comparisons = {0, 2, 1, -1, -1, 3, 4, 5};  // -1: contradict each other
     const int y_first = inside[1] > inside[0] ? 1 : 0;
     const int z_before_y = inside[2] > inside[1] ? 2 : 0;
     const int z_before_x = inside[2] > inside[0] ? 4 : 0;

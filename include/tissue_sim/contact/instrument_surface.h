@@ -45,8 +45,8 @@ struct ClosestFeature {
   int triangle = -1;  ///< that has the point
 };
 
-/// Depth and direction of p (tip frame) by the point of the surface nearest to it, which somebody has found. The sign is that
-/// of the pseudonormal there; where p lies on the surface the direction is that normal. Where nothing was found p is
+/// Depth and direction of p (tip frame) by `closest`, the point of the surface nearest to it. The sign is that of the
+/// pseudonormal there; where p lies on the surface the direction is that normal. Where `closest` has no triangle p is
 /// outside, far away.
 ClosestFeature feature_at(const InstrumentSurface& surface, const Vector3& p, const ClosestOnMesh& closest);
 

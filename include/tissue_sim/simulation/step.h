@@ -48,7 +48,7 @@ struct OrganWorkspace {
   std::vector<OrganContact> contacts;  ///< of the step, one a place that was pressed in any of its substeps
   std::vector<int> contact_of;         ///< per place, into contacts, where contact_round is the current one
   std::vector<std::uint64_t> contact_round;
-  std::uint64_t round = 0;  ///< of contacts: one a step
+  std::uint64_t round = 0;  ///< another one whenever contacts begins anew
 };
 
 struct Workspace {
