@@ -107,6 +107,25 @@ void Bearers::add(int vertex, double weight) {
   ++count;
 }
 
+Mobility mobility(const Bearers& bearers, const std::vector<double>& inverse_mass) {
+  if (bearers.count == 1) {  // most places are vertices
+    const double weight = bearers.weights[0];
+    const double ease = weight * (weight * inverse_mass[bearers.vertices[0]]);
+    return {ease, ease};
+  }
+  double sum = 0.0;
+  double most = 0.0;
+  bool attached = false;
+  for (int i = 0; i < bearers.count; ++i) {
+    const double free = inverse_mass[bearers.vertices[i]];
+    const double share = bearers.weights[i] * free;
+    sum += bearers.weights[i] * share;
+    most = std::max(most, share);
+    attached = attached || free == 0.0;
+  }
+  return {sum, attached ? std::max(sum, 0.5 * most) : sum};
+}
+
 void bear_by(const Embedding& embedding, const std::vector<Triangle>& triangles, const std::vector<Vector3>& positions,
              std::vector<ContactPoint>& points) {
   for (ContactPoint& point : points) {

@@ -11,7 +11,7 @@ constexpr std::size_t lanes = NeoHookeanBatch::lanes;
 
 /// Of critical, of a band's spring. Undamped, a wave that the coarser level does not share was thrown back into the
 /// region: with a radius of five edges the force on a sliding probe swung by a third.
-constexpr double band_damping = 0.7;
+constexpr double band_damping = 1.4;
 
 /// Of what a region needs when it is first gathered: it grows while an instrument goes in.
 constexpr std::size_t spare = 2;
@@ -259,9 +259,11 @@ void solid_forces(const RestShape& shape, double dt, AwakeSolid& awake) {
   if (!awake.cubes.batches.empty()) {
     add_cube_forces(awake.cubes, awake.damped.front().data(), awake.forces.front().data());
   }
+  const double stiffest = 0.25 / (dt * dt);  // 1/s^2 and 1/s: what a substep can follow
+  const double fastest = 0.5 / dt;
   for (const BandVertex& band : awake.band) {
-    const auto stiffness = static_cast<float>(std::min(band.stiffness, 0.25 * band.mass / (dt * dt)));
-    const auto damping = static_cast<float>(std::min(band.damping, 0.5 * band.mass / dt));
+    const auto stiffness = static_cast<float>(std::min(band.stiffness, stiffest * band.mass));
+    const auto damping = static_cast<float>(std::min(band.damping, fastest * band.mass));
     awake.forces[band.vertex] += stiffness * (band.target - awake.displacements[band.vertex]) +
                                  damping * (band.velocity - awake.velocities[band.vertex]);
   }

@@ -13,8 +13,8 @@ namespace {
 constexpr double speed_of_sound = 1500.0;  ///< m/s, the speed of sound in soft tissue
 constexpr double organ_sizes = 10.0;       ///< times the organ's size
 
-/// Vertices of which a step looks at everything, in turn: some 5 us. A million would cost more than the step.
-constexpr std::size_t looked_at_in_turn = 1024;
+/// Vertices of which a step looks at everything, in turn: some 1 us a level. A million would cost more than the step.
+constexpr std::size_t looked_at_in_turn = 256;
 
 /// One vertex. Written so that a NaN fails.
 bool healthy(const Vector3& rest, const Vector3& position, const Vector3& velocity, double limit) {

@@ -29,7 +29,7 @@ constexpr double settling_time = 0.01;
 constexpr std::size_t usual_centres = 64;
 
 /// Of mu times the edge: a band's spring.
-constexpr double band_stiffness = 3.0;
+constexpr double band_stiffness = 1.5;
 
 /// Of the way: what a pin that has strayed comes back in one substep.
 constexpr double pin_return = 0.2;

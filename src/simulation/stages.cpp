@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "tissue_sim/contact/propagation.h"
-#include "tissue_sim/contact/response.h"
 #include "tissue_sim/simulation/health.h"
 #include "tissue_sim/simulation/integrator.h"
 
@@ -24,6 +23,9 @@ constexpr double fastest_motion = 130.0;
 /// 3.5 %). Without the organ's own motion stiff solids in steps of 50 ms were thrown five times as far as pressed.
 constexpr double unseen_way = 0.5;
 constexpr double unseen_slip = 0.0625;
+
+/// Of the motion limit: what is farther than this from the organ's box is far from it.
+constexpr double far_way = 2.0;
 
 /// m/s, and of the organ's size in a second. An untouched organ whose fastest vertex is slower than both goes to sleep:
 /// what is left to move is far below a micrometre, and below a millionth of the size.
@@ -73,10 +75,40 @@ Vector3 velocity_of(const Pose& before, const Pose& now, const Vector3& point, d
   return (point - before.apply(now.apply_inverse(point))) / dt;
 }
 
-/// m, how far an instrument's piece and the organ can have moved against each other so far.
-double travel_of(const StepContext& context, std::size_t piece) {
-  const Clearance& clearance = context.state.clearances[piece];
-  return clearance.shift + clearance.turn * context.world.pieces[piece].surface.reach;
+/// m. The farthest way of a point of a box in the tip's frame from one pose of the tip to the next: that of a corner,
+/// since it grows by the same from point to point. Small for a shaft that spins about itself.
+double farthest_way(const Box& box, const Pose& from, const Pose& to) {
+  const Matrix3 turned = to.orientation.toRotationMatrix() - from.orientation.toRotationMatrix();
+  const Vector3 moved = to.position - from.position;
+  double farthest = 0.0;
+  for (int corner = 0; corner < 8; ++corner) {
+    Vector3 p;
+    for (int axis = 0; axis < 3; ++axis) p[axis] = (corner >> axis & 1) != 0 ? box.upper[axis] : box.lower[axis];
+    farthest = std::max(farthest, (turned * p + moved).squaredNorm());
+  }
+  return std::sqrt(farthest);
+}
+
+/// What of an instrument's piece lies in the organ's box grown by `margin`, in the tip's frame; the tip if nothing does.
+Box part_near(const StepContext& context, const InstrumentPiece& piece, double margin) {
+  const Pose& pose = context.workspace.now[piece.instrument];
+  const Pose to_tip = {pose.apply_inverse(Vector3::Zero()), pose.orientation.conjugate()};
+  const OrganWorkspace& work = context.workspace.organs[context.organ];
+  const Box organ = scene_bounds(bounds_of(work.patches).grown(margin), to_tip);
+  const Box& all = piece.surface.bounds;
+  if (!organ.overlaps(all)) return {Vector3::Zero(), Vector3::Zero()};
+  return {organ.lower.cwiseMax(all.lower), organ.upper.cwiseMin(all.upper)};
+}
+
+/// Whether an instrument's piece and the organ can have moved against each other by more than goes unseen. What of the
+/// piece was far from the organ does not count before it can have come near: else a long shaft, whose far end swings,
+/// would be looked at again and again.
+bool has_moved(const StepContext& context, const LastLook& last) {
+  const double limit = context.model().motion_limit;
+  const double of_organ = context.workspace.organs[context.organ].patches.travel - last.travel;
+  const bool unseen = of_organ + last.way_of_near <= unseen_way * limit;
+  const bool rest_is_far = of_organ + last.way_of_all <= far_way * limit;
+  return !(unseen && rest_is_far);  // a NaN has
 }
 
 void find_instrument_velocities(StepContext& context) {
@@ -195,7 +227,7 @@ double integrate_elements(StepContext& context) {
   OrganWorkspace& work = context.work();
   remember_forces(context, work);
   if (model.integrator == Integrator::vertex_block_descent) {
-    stop_at_instrument(work.points, model.rest.inverse_mass, state.positions, context.dt, state.velocities);
+    stop_at_instrument(work.points, model.rest.inverse_mass, state.positions, context.dt, state.velocities, work.response);
     const double speed = descend(model, context.world.gravity, context.dt, work.points, state, work.descent);
     keep_forces(context);
     if (context.motion.forces_wanted) bearing_forces(model, work.points, state, work.descent, state.forces);
@@ -213,7 +245,8 @@ double integrate_elements(StepContext& context) {
     solid_forces(model, context.dt, state, work.levels);
   }
   accelerate(model, context.world.gravity, context.dt, state.forces, state);
-  stop_at_instrument(work.points, model.rest.inverse_mass, state.positions, context.dt, state.velocities);
+  stop_at_instrument(work.points, model.rest.inverse_mass, state.positions, context.dt, state.velocities,
+                     work.response);
   const double speed = std::max(coarser_speed, advance(model, context.dt, state));
   if (!model.levels.empty()) {
     press_coarser(model, work.points, state, work.levels);
@@ -285,15 +318,19 @@ Workspace build_workspace(const World& world, int threads) {
     work.detections.resize(world.pieces.size());
     work.penetrations.resize(world.pieces.size());
     work.near.assign(world.pieces.size(), 0);
-    work.looked_at.assign(world.pieces.size(), 0.0);
+    work.last_looks.assign(world.pieces.size(), {});
     const OrganSurface surface = {rest.positions, rest.triangles, rest.topology, rest.component_roots, work.patches};
     for (std::size_t p = 0; p < world.pieces.size(); ++p) {
       prepare(work.detections[p], surface);
       prepare(work.penetrations[p], surface);
       make_room(work.detections[p], work.penetrations[p]);
     }
-    work.accelerations.assign(rest.positions.size(), Vector3::Zero());
-    if (rest.elastic()) work.pressing_of.assign(count_memories(world, rest), -1);
+    if (rest.elastic()) {
+      work.pressing_of.assign(count_memories(world, rest), -1);
+      work.response.delassus.reserve(usual_contacts, rest.positions.size());
+      work.response.lacking.reserve(usual_contacts);
+      work.response.impulses.reserve(usual_contacts);
+    }
     const std::size_t places = world.pieces.size() * count_places(rest);
     if (model.integrator == Integrator::vertex_block_descent) {
       prepare(work.descent, rest);
@@ -380,8 +417,13 @@ void place_instruments(StepContext& context, int substep, int substeps) {
   for (std::size_t p = 0; p < context.world.pieces.size(); ++p) {
     const int instrument = context.world.pieces[p].instrument;
     Clearance& clearance = context.state.clearances[p];
-    clearance.shift += (workspace.now[instrument].position - workspace.before[instrument].position).norm();
-    clearance.turn += angle_between(workspace.before[instrument], workspace.now[instrument]);
+    const Pose& before = workspace.before[instrument];
+    const Pose& now = workspace.now[instrument];
+    clearance.shift += (now.position - before.position).norm();
+    clearance.turn += angle_between(before, now);
+    LastLook& last = context.work().last_looks[p];
+    last.way_of_near += farthest_way(last.near, before, now);
+    last.way_of_all += farthest_way(context.world.pieces[p].surface.bounds, before, now);
   }
 }
 
@@ -389,16 +431,16 @@ bool looks_again(StepContext& context) {
   OrganWorkspace& work = context.work();
   const double limit = context.model().motion_limit;
   bool again = context.substep == 1 || context.jumps;
-  for (std::size_t p = 0; p < work.looked_at.size(); ++p) {
-    again = again || !(travel_of(context, p) - work.looked_at[p] <= unseen_way * limit);  // a NaN is looked at
-  }
+  for (const LastLook& last : work.last_looks) again = again || has_moved(context, last);
   if (!again) find_instrument_velocities(context);
   for (std::size_t i = 0; i < work.points.size() && !again; ++i) {
     const ContactPoint& point = work.points[i];
     const Vector3 carried = point.carried + context.dt * point.instrument_velocity;
     again = !((at_point(point, context.state.positions) - carried).norm() <= unseen_slip * limit);
   }
-  for (std::size_t p = 0; p < work.looked_at.size() && again; ++p) work.looked_at[p] = travel_of(context, p);
+  for (std::size_t p = 0; p < work.last_looks.size() && again; ++p) {
+    work.last_looks[p] = {work.patches.travel, part_near(context, context.world.pieces[p], far_way * limit)};
+  }
   return again;
 }
 
@@ -487,6 +529,7 @@ void find_contacts(StepContext& context) {
   if (parts && (context.state.asleep || !all_awake(work.points, context.state))) {
     note_motion(context, wake(context.model(), work.points, context.state, work.levels));
   }
+  if (rest.elastic()) work.response.delassus.build(work.points, rest.inverse_mass);
   for (ContactPoint& point : work.points) point.carried = at_point(point, context.state.positions);
   context.state.asleep = context.state.asleep && !rest.elastic();
   if (!context.jumps) find_instrument_velocities(context);  // what was not on its way throws nothing
@@ -535,7 +578,7 @@ void bear(StepContext& context) {
   if (!context.motion.forces_wanted) {
     for (ContactPoint& point : work.points) point.force = 0.0;
   } else if (rest.elastic()) {
-    bear_forces(rest.inverse_mass, context.state.forces, work.accelerations, work.points);
+    bear_forces(rest.inverse_mass, context.state.forces, work.points, work.response);
   }
   if (rest.elastic() && context.model().integrator == Integrator::explicit_substeps) keep_forces(context);
   for (const ContactPoint& point : work.points) record_contact(context, point);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <sstream>
 
+#include "tissue_sim/contact/contact_point.h"
 #include "tissue_sim/geometry/elementary.h"
 #include "tissue_sim/simulation/integrator.h"
 #include "tissue_sim/simulation/vertex_block_descent.h"
@@ -142,6 +143,21 @@ void add_wall_region(const Organ& organ, OrganModel& model) {
   rest.enclosed.damping *= softer;
 }
 
+/// The vertices of a piece that may poke into a triangle of an organ: where it is curved more sharply than `radius` (m),
+/// and not inside another piece of the same instrument, which keeps the organ away from there.
+std::vector<int> poking_vertices(const std::vector<InstrumentPiece>& pieces, const InstrumentPiece& piece,
+                                 double radius) {
+  std::vector<int> vertices = sharper_than(piece.surface, radius);
+  for (const InstrumentPiece& other : pieces) {
+    if (&other == &piece || other.instrument != piece.instrument || !other.surface.closed) continue;
+    const auto inside = [&](int v) {
+      return closest_feature(other.surface, piece.surface.vertices[v]).depth > poke_reach;
+    };
+    vertices.erase(std::remove_if(vertices.begin(), vertices.end(), inside), vertices.end());
+  }
+  return vertices;
+}
+
 }  // namespace
 
 World build_world(const Scene& scene) {
@@ -170,7 +186,7 @@ World build_world(const Scene& scene) {
     model.motion_limit = std::max(std::min(edge_fraction * model.rest.mean_edge, thickness_fraction * thinnest),
                                   0.01 * model.rest.mean_edge);
     for (const InstrumentPiece& piece : world.pieces) {
-      model.poking.push_back(sharper_than(piece.surface, sharp * model.rest.mean_edge));
+      model.poking.push_back(poking_vertices(world.pieces, piece, sharp * model.rest.mean_edge));
     }
     choose_integrator(scene, organ, model);
     if (model.integrator == Integrator::vertex_block_descent) {

@@ -45,12 +45,31 @@ struct Case {
   Place first;
   Place last;
 
+  /// It leans as the surface does, without a turn about itself.
   Pose at(double along, double in) const {
     const Vector3 outward = ((1.0 - along) * first.outward + along * last.outward).normalized();
     const Vector3 point = (1.0 - along) * first.point + along * last.point;
-    return {point - in * outward, Eigen::Quaterniond::FromTwoVectors(Vector3::UnitZ(), -outward)};
+    const auto upright = Eigen::Quaterniond::FromTwoVectors(Vector3::UnitZ(), -first.outward);
+    return {point - in * outward, Eigen::Quaterniond::FromTwoVectors(-first.outward, -outward) * upright};
   }
 };
+
+/// Where the tip has slid so far, 5 mm deep: over the bulge of the organ, on the surface, it is a longer way.
+Place end_of_slide(const InstrumentSurface& surface, const Place& first) {
+  const auto place = [&](double way) {
+    const ClosestFeature closest = closest_feature(surface, first.point + way * Vector3(1.0, 0.0, 0.5));
+    return Place{closest.point, closest.direction};
+  };
+  double enough = 2.0 * slide;
+  double too_short = 0.0;
+  for (int halving = 0; halving < 40; ++halving) {
+    const double middle = 0.5 * (too_short + enough);
+    const Place last = place(middle);
+    const Vector3 moved = last.point - depth * last.outward - (first.point - depth * first.outward);
+    (moved.norm() < slide ? too_short : enough) = middle;
+  }
+  return place(enough);
+}
 
 /// The bundled liver as a solid, held at its underside as in config/scenes/demo.yaml, under the bundled probe. `mesh`:
 /// its tetrahedra, fine where it is pressed; empty: the bundled ones, cut there until they are.
@@ -65,14 +84,13 @@ Case liver_under_probe(const std::string& config, const std::string& mesh) {
   liver.solid = read_tetrahedral_mesh(config + "/organs/liver_12.msh", 0.001, warnings);
   const InstrumentSurface surface = build_instrument_surface(take_surface(liver.solid), true);
   const ClosestFeature first = closest_feature(surface, {-0.045, -0.005, 0.05});
-  const ClosestFeature last = closest_feature(surface, first.point + Vector3(slide, 0.0, 0.01));
   made.first = {first.point, first.direction};
-  made.last = {last.point, last.direction};
+  made.last = end_of_slide(surface, made.first);
   if (!mesh.empty()) liver.solid = read_tetrahedral_mesh(mesh, 0.001, warnings);
   const auto longest = [&](const Vector3& p) {
-    const Vector3 along = last.point - first.point;
-    const double part = std::clamp((p - first.point).dot(along) / along.squaredNorm(), 0.0, 1.0);
-    const double away = (p - first.point - part * along).norm();
+    const Vector3 along = made.last.point - made.first.point;
+    const double part = std::clamp((p - made.first.point).dot(along) / along.squaredNorm(), 0.0, 1.0);
+    const double away = (p - made.first.point - part * along).norm();
     return longest_edge * fine + grading * std::max(0.0, away - fine_within);
   };
   if (mesh.empty()) refine(liver.solid, longest);

@@ -24,6 +24,10 @@ using QuadIndex = int __attribute__((vector_size(16)));
 #define TISSUE_SIM_SHUFFLE(a, b, ...) __builtin_shuffle(a, b, QuadIndex{__VA_ARGS__})
 #endif
 
+TISSUE_SIM_INLINE void join(const Eight& low, const Eight& high, Sixteen& both) {
+  both = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+}
+
 template <class Lane>
 struct Three {
   Lane x, y, z;

@@ -81,14 +81,35 @@ TISSUE_SIM_INLINE void store(const Three<Lane>& v, float* row) {
   *reinterpret_cast<Lane*>(row + 2 * stride) = v.z;
 }
 
-/// Replaces the edges, from lane l on, by the pull of the tissue on corners 1 to 3: the gradient of the energy there.
+/// What never changes of tetrahedra, one a lane.
 template <class Lane>
-TISSUE_SIM_INLINE void pull(const NeoHookeanBatch& batch, std::size_t l, float* edges) {
-  const Lane d[9] = {lane<Lane>(&batch.inverse_rest[0][l]), lane<Lane>(&batch.inverse_rest[1][l]),
-                     lane<Lane>(&batch.inverse_rest[2][l]), lane<Lane>(&batch.inverse_rest[3][l]),
-                     lane<Lane>(&batch.inverse_rest[4][l]), lane<Lane>(&batch.inverse_rest[5][l]),
-                     lane<Lane>(&batch.inverse_rest[6][l]), lane<Lane>(&batch.inverse_rest[7][l]),
-                     lane<Lane>(&batch.inverse_rest[8][l])};
+struct Constants {
+  Lane inverse_rest[9];
+  Lane volume_mu;
+  Lane volume_stiff;
+};
+
+/// Of a batch's lanes from l on.
+template <class Lane>
+TISSUE_SIM_INLINE void load(const NeoHookeanBatch& batch, std::size_t l, Constants<Lane>& constants) {
+  for (std::size_t i = 0; i < 9; ++i) constants.inverse_rest[i] = lane<Lane>(&batch.inverse_rest[i][l]);
+  constants.volume_mu = lane<Lane>(&batch.volume_mu[l]);
+  constants.volume_stiff = lane<Lane>(&batch.volume_stiff[l]);
+}
+
+/// Of all lanes of two batches.
+TISSUE_SIM_INLINE void load_two(const NeoHookeanBatch& low, const NeoHookeanBatch& high, Constants<Sixteen>& constants) {
+  for (std::size_t i = 0; i < 9; ++i) {
+    join(lane<Eight>(low.inverse_rest[i].data()), lane<Eight>(high.inverse_rest[i].data()), constants.inverse_rest[i]);
+  }
+  join(lane<Eight>(low.volume_mu.data()), lane<Eight>(high.volume_mu.data()), constants.volume_mu);
+  join(lane<Eight>(low.volume_stiff.data()), lane<Eight>(high.volume_stiff.data()), constants.volume_stiff);
+}
+
+/// Replaces the edges by the pull of the tissue on corners 1 to 3: the gradient of the energy there.
+template <class Lane>
+TISSUE_SIM_INLINE void pull(const Constants<Lane>& constants, float* edges) {
+  const Lane* d = constants.inverse_rest;
   const Three<Lane> e1{lane<Lane>(edges), lane<Lane>(edges + stride), lane<Lane>(edges + 2 * stride)};
   const Three<Lane> e2{lane<Lane>(edges + 3 * stride), lane<Lane>(edges + 4 * stride), lane<Lane>(edges + 5 * stride)};
   const Three<Lane> e3{lane<Lane>(edges + 6 * stride), lane<Lane>(edges + 7 * stride), lane<Lane>(edges + 8 * stride)};
@@ -97,7 +118,7 @@ TISSUE_SIM_INLINE void pull(const NeoHookeanBatch& batch, std::size_t l, float* 
   combine(d[1], e1, d[4], e2, d[7], e3, h1);
   combine(d[2], e1, d[5], e2, d[8], e3, h2);
   Three<Lane> p0, p1, p2;
-  stress(h0, h1, h2, lane<Lane>(&batch.volume_mu[l]), lane<Lane>(&batch.volume_stiff[l]), p0, p1, p2);
+  stress(h0, h1, h2, constants.volume_mu, constants.volume_stiff, p0, p1, p2);
   Three<Lane> f;
   combine(d[0], p0, d[1], p1, d[2], p2, f);
   store(f, edges);
@@ -105,6 +126,16 @@ TISSUE_SIM_INLINE void pull(const NeoHookeanBatch& batch, std::size_t l, float* 
   store(f, edges + 3 * stride);
   combine(d[6], p0, d[7], p1, d[8], p2, f);
   store(f, edges + 6 * stride);
+}
+
+/// The same for a batch, a register's worth of lanes at a time.
+template <class Lane>
+TISSUE_SIM_INLINE void pull_in_parts(const NeoHookeanBatch& batch, float* edges) {
+  for (std::size_t l = 0; l < lanes; l += sizeof(Lane) / sizeof(float)) {
+    Constants<Lane> constants;
+    load(batch, l, constants);
+    pull(constants, edges + l);
+  }
 }
 
 /// Which batches: some that follow each other, or those of a list.
@@ -119,25 +150,42 @@ struct ListedBatches {
   std::size_t operator[](std::size_t i) const { return static_cast<std::size_t>(list[i]); }
 };
 
+/// How a few batches, side by side in rows of edges, are computed: each by itself, or two in one register.
+template <class Lane>
+struct OneByOne {
+  TISSUE_SIM_INLINE static void pull_all(const NeoHookeanBatch* const* batches, std::size_t count, float* rows) {
+    for (std::size_t b = 0; b < count; ++b) pull_in_parts<Lane>(*batches[b], rows + lanes * b);
+  }
+};
+struct TwoByTwo {
+  TISSUE_SIM_INLINE static void pull_all(const NeoHookeanBatch* const* batches, std::size_t count, float* rows) {
+    std::size_t b = 0;
+    for (; b + 1 < count; b += 2) {
+      Constants<Sixteen> constants;
+      load_two(*batches[b], *batches[b + 1], constants);
+      pull(constants, rows + lanes * b);
+    }
+    if (b < count) pull_in_parts<Eight>(*batches[b], rows + lanes * b);
+  }
+};
+
 /// Gathers a few batches, computes them, scatters them. Rows that were written in halves a moment ago cannot be read
 /// whole without a stall: batch by batch it took 7.6 ns a tetrahedron and not 6.5 (20,000 of them, AVX2, one core of an
 /// AMD EPYC, Zen 4). Corner forces kept for a second pass, a sum for each vertex, took 7.7; tetrahedra in random order
 /// take 6.9.
-template <class Lane, class Chosen>
+template <class Few, class Chosen>
 TISSUE_SIM_INLINE void add_forces(const NeoHookeanSolid& solid, const Chosen& chosen, const float* displacements,
                                   float* forces) {
-  constexpr std::size_t width = sizeof(Lane) / sizeof(float);
   alignas(64) float rows[9 * stride];
+  const NeoHookeanBatch* batches[block];
   for (std::size_t first = 0; first < chosen.count; first += block) {
     const std::size_t count = std::min(block, chosen.count - first);
-    for (std::size_t b = 0; b < count; ++b) gather(solid.batches[chosen[first + b]], displacements, rows + lanes * b);
-    for (std::size_t b = 0; b < count; ++b) {
-      for (std::size_t l = 0; l < lanes; l += width)
-        pull<Lane>(solid.batches[chosen[first + b]], l, rows + lanes * b + l);
-    }
+    for (std::size_t b = 0; b < count; ++b) batches[b] = &solid.batches[chosen[first + b]];
+    for (std::size_t b = 0; b < count; ++b) gather(*batches[b], displacements, rows + lanes * b);
+    Few::pull_all(batches, count, rows);
     for (std::size_t b = 0; b < count; ++b) {
       const std::size_t tetrahedra = std::min(lanes, solid.tetrahedra - lanes * chosen[first + b]);
-      scatter(solid.batches[chosen[first + b]], tetrahedra, rows + lanes * b, forces);
+      scatter(*batches[b], tetrahedra, rows + lanes * b, forces);
     }
   }
 }
@@ -145,13 +193,19 @@ TISSUE_SIM_INLINE void add_forces(const NeoHookeanSolid& solid, const Chosen& ch
 template <class Chosen>
 __attribute__((noinline)) void add_forces_baseline(const NeoHookeanSolid& solid, const Chosen& chosen,
                                                    const float* displacements, float* forces) {
-  add_forces<Four>(solid, chosen, displacements, forces);
+  add_forces<OneByOne<Four>>(solid, chosen, displacements, forces);
 }
 #ifdef __x86_64__
 template <class Chosen>
 __attribute__((target("avx2"))) void add_forces_avx2(const NeoHookeanSolid& solid, const Chosen& chosen,
                                                      const float* displacements, float* forces) {
-  add_forces<Eight>(solid, chosen, displacements, forces);
+  add_forces<OneByOne<Eight>>(solid, chosen, displacements, forces);
+}
+template <class Chosen>
+__attribute__((target("avx512f,avx512dq,avx512vl"))) void add_forces_avx512(const NeoHookeanSolid& solid,
+                                                                            const Chosen& chosen,
+                                                                            const float* displacements, float* forces) {
+  add_forces<TwoByTwo>(solid, chosen, displacements, forces);
 }
 #endif
 
@@ -163,7 +217,8 @@ void add_chosen(const NeoHookeanSolid& solid, const Chosen& chosen, const float*
   }
 #ifdef __x86_64__
   const TinyIsZero tiny_is_zero;
-  if (set != InstructionSet::baseline) return add_forces_avx2(solid, chosen, displacements, forces);
+  if (set == InstructionSet::avx512) return add_forces_avx512(solid, chosen, displacements, forces);
+  if (set == InstructionSet::avx2) return add_forces_avx2(solid, chosen, displacements, forces);
 #endif
   add_forces_baseline(solid, chosen, displacements, forces);
 }

@@ -121,6 +121,13 @@ TEST(PushOut, TellsHowFarAVertexWentAtMost) {
   }
 }
 
+void stop_at_instrument(std::vector<ContactPoint>& points, const std::vector<double>& inverse_mass,
+                        const std::vector<Vector3>& positions, double dt, std::vector<Vector3>& velocities) {
+  ResponseRoom room;
+  room.delassus.build(points, inverse_mass);
+  tissue_sim::stop_at_instrument(points, inverse_mass, positions, dt, velocities, room);
+}
+
 /// With every point where its target is: nothing to close, the instrument's own velocity counts.
 void stop(std::vector<ContactPoint>& points, const std::vector<double>& inverse_mass,
           std::vector<Vector3>& velocities) {
@@ -277,8 +284,9 @@ TEST(Bearers, TwelveShareTheWayAndTheImpulse) {
 
 std::vector<ContactPoint> borne(const std::vector<double>& inverse_mass, const std::vector<Vector3>& forces,
                                 std::vector<ContactPoint> points) {
-  std::vector<Vector3> accelerations(forces.size(), Vector3::Zero());
-  bear_forces(inverse_mass, forces, accelerations, points);
+  ResponseRoom room;
+  room.delassus.build(points, inverse_mass);
+  bear_forces(inverse_mass, forces, points, room);
   return points;
 }
 

@@ -118,7 +118,7 @@ struct Injections {
     simulation.go_to(next, duration);
     ++made;
     // Of what sleeps and of instruments far away a step looks at a thousand vertices.
-    const std::size_t turns = (state().positions.size() + 1023) / 1024;
+    const std::size_t turns = (state().positions.size() + 255) / 256;
     for (std::size_t i = 1; i < turns && !simulation.report.recovered && !not_a_number(model(), state()).empty(); ++i) {
       simulation.go_to(next, duration);
     }
@@ -274,7 +274,7 @@ TEST(Injected, IntoALargeOrganAsleepIsFoundInTurn) {
     do {
       simulation.go_to(over_sphere(-0.2));
     } while (++steps < 100 && !simulation.report.recovered);
-    EXPECT_LE(steps, 10) << "of " << vertices << " vertices, 1024 a step";
+    EXPECT_LE(steps, 40) << "of " << vertices << " vertices, 256 a step";
     EXPECT_EQ(simulation.organ().positions, simulation.rest().positions);
   }
 }

@@ -349,9 +349,7 @@ TEST(Solid, ContactsGoAlongWithTheInstrument) {
 
   ASSERT_GE(simulation.report.substeps, 3);
   const InstrumentSurface& ball = simulation.world.pieces[0].surface;
-  const Clearance& clearance = simulation.state.organs[0].clearances[0];
-  const double since = clearance.shift + clearance.turn * ball.reach - simulation.workspace.organs[0].looked_at[0];
-  EXPECT_GT(since, 0.5 * deeper) << "it was looked for again";
+  EXPECT_GT(simulation.workspace.organs[0].last_looks[0].way_of_near, 0.5 * deeper) << "it was looked for again";
   ASSERT_FALSE(simulation.report.contacts.empty());
   for (const OrganContact& contact : simulation.report.contacts) {
     EXPECT_LT(closest_feature(ball, pose.apply_inverse(contact.point)).depth, 0.1 * deeper);

@@ -20,6 +20,15 @@ struct Bearers {
   void add(int vertex, double weight);
 };
 
+/// 1/kg, how easily a place moves. Beside attached vertices bounded from below, so that no vertex goes more than twice
+/// as far as the place is asked to: one free corner with a small weight would be thrown. Where all are free there is
+/// nothing to bound, and twelve that share a place would be held back.
+struct Mobility {
+  double unbounded = 0.0;  ///< sum w_i^2 / m_i
+  double ease = 0.0;       ///< 0 where all vertices are attached
+};
+Mobility mobility(const Bearers& bearers, const std::vector<double>& inverse_mass);
+
 /// A point of an organ's surface and the plane of the instrument that it must not be behind: direction . x >= target.
 struct ContactPoint {
   int piece = 0;                       ///< of the world's instrument pieces
@@ -32,8 +41,6 @@ struct ContactPoint {
   double lift = 0.0;                              ///< m, along direction, from where the bearers put it to where it is
   Vector3 carried = Vector3::Zero();              ///< m, where its bearers would be had they gone with the instrument
   Vector3 instrument_velocity = Vector3::Zero();  ///< m/s, of the instrument at the point
-  Vector3 pace = Vector3::Zero();                 ///< m/s or m/s^2, least along direction; set by the response
-  double ease = 0.0;                              ///< 1/kg, how easily the point moves; set by the response
   double impulse = 0.0;                           ///< N s along direction, on the organ; set by the response
   double force = 0.0;                             ///< N along direction, on the organ; see bear_forces
   double stiffness = 0.0;                         ///< N/m, of the implicit integrator; see descend

@@ -3,7 +3,7 @@
 #include <memory>
 #include <vector>
 
-#include "tissue_sim/contact/contact_point.h"
+#include "tissue_sim/contact/response.h"
 #include "tissue_sim/simulation/integrator.h"
 #include "tissue_sim/simulation/levels.h"
 #include "tissue_sim/simulation/state.h"
@@ -28,17 +28,25 @@ struct Motion {
 
 /// Room for one organ's step. Holds nothing that changes what the next step does: how far the boxes of its patches
 /// have been outrun saves work only.
+/// How far an instrument's piece and the organ may have gone since contact was last looked for.
+struct LastLook {
+  double travel = 0.0;                            ///< m, of the organ's patches then
+  Box near = {Vector3::Zero(), Vector3::Zero()};  ///< of the piece what was near the organ then; in the tip's frame
+  double way_of_near = 0.0;                       ///< m, since then
+  double way_of_all = 0.0;
+};
+
 struct OrganWorkspace {
   SurfacePatches patches;                 ///< of the organ's surface
   std::vector<Detection> detections;      ///< per piece
   std::vector<Penetration> penetrations;  ///< per piece
   std::vector<char> near;                 ///< per piece: its box and the organ's overlap
-  std::vector<double> looked_at;          ///< m, per piece: what had been travelled when contact was looked for
+  std::vector<LastLook> last_looks;       ///< per piece
   std::vector<ContactPoint> points;
   std::vector<int> bearers;  ///< of the points, ascending
   ElementRoom elements;
   LevelsRoom levels;
-  std::vector<Vector3> accelerations;
+  ResponseRoom response;  ///< of the points
   std::vector<int> pressing_of;  ///< per place, into the state's pressing; -1 between two uses
   DescentRoom descent;
   OrganState last_good;
