@@ -56,17 +56,19 @@ class Lap {
   std::chrono::steady_clock::time_point start_;
 };
 
+Vector3 corner_of(const Box& box, int corner) {
+  Vector3 p;
+  for (int axis = 0; axis < 3; ++axis) p[axis] = (corner >> axis & 1) != 0 ? box.upper[axis] : box.lower[axis];
+  return p;
+}
+
 /// m. How far a turn from one pose to the other moves a point of the box at most: less than by all of its reach where
 /// the box lies along the axis, as a shaft that spins about itself.
 double way_of_turn(const InstrumentSurface& surface, const Pose& from, const Pose& to) {
   const Eigen::AngleAxisd turn(from.orientation.conjugate() * to.orientation);
   double farthest = 0.0;
   for (int corner = 0; corner < 8; ++corner) {
-    Vector3 p;
-    for (int axis = 0; axis < 3; ++axis) {
-      p[axis] = (corner >> axis & 1) != 0 ? surface.bounds.upper[axis] : surface.bounds.lower[axis];
-    }
-    farthest = std::max(farthest, p.cross(turn.axis()).norm());
+    farthest = std::max(farthest, corner_of(surface.bounds, corner).cross(turn.axis()).norm());
   }
   return std::min(surface.reach, farthest) * angle_between(from, to);
 }
@@ -82,14 +84,13 @@ double farthest_way(const Box& box, const Pose& from, const Pose& to) {
   const Vector3 moved = to.position - from.position;
   double farthest = 0.0;
   for (int corner = 0; corner < 8; ++corner) {
-    Vector3 p;
-    for (int axis = 0; axis < 3; ++axis) p[axis] = (corner >> axis & 1) != 0 ? box.upper[axis] : box.lower[axis];
-    farthest = std::max(farthest, (turned * p + moved).squaredNorm());
+    farthest = std::max(farthest, (turned * corner_of(box, corner) + moved).squaredNorm());
   }
   return std::sqrt(farthest);
 }
 
-/// What of an instrument's piece lies in the organ's box grown by `margin`, in the tip's frame; the tip if nothing does.
+/// What of an instrument's piece lies in the organ's box grown by `margin`, in the tip's frame; the tip if nothing
+/// does.
 Box part_near(const StepContext& context, const InstrumentPiece& piece, double margin) {
   const Pose& pose = context.workspace.now[piece.instrument];
   const Pose to_tip = {pose.apply_inverse(Vector3::Zero()), pose.orientation.conjugate()};
@@ -227,7 +228,8 @@ double integrate_elements(StepContext& context) {
   OrganWorkspace& work = context.work();
   remember_forces(context, work);
   if (model.integrator == Integrator::vertex_block_descent) {
-    stop_at_instrument(work.points, model.rest.inverse_mass, state.positions, context.dt, state.velocities, work.response);
+    stop_at_instrument(work.points, model.rest.inverse_mass, state.positions, context.dt, state.velocities,
+                       work.response);
     const double speed = descend(model, context.world.gravity, context.dt, work.points, state, work.descent);
     keep_forces(context);
     if (context.motion.forces_wanted) bearing_forces(model, work.points, state, work.descent, state.forces);
@@ -414,16 +416,19 @@ void place_instruments(StepContext& context, int substep, int substeps) {
     const InstrumentMotion& motion = context.motion.instruments[i];
     workspace.now[i] = interpolate(motion.from, motion.to, fraction);
   }
+  double angle = 0.0;
   for (std::size_t p = 0; p < context.world.pieces.size(); ++p) {
-    const int instrument = context.world.pieces[p].instrument;
+    const InstrumentPiece& piece = context.world.pieces[p];
+    const Pose& before = workspace.before[piece.instrument];
+    const Pose& now = workspace.now[piece.instrument];
+    const bool another = p == 0 || piece.instrument != context.world.pieces[p - 1].instrument;
+    if (another) angle = angle_between(before, now);
     Clearance& clearance = context.state.clearances[p];
-    const Pose& before = workspace.before[instrument];
-    const Pose& now = workspace.now[instrument];
     clearance.shift += (now.position - before.position).norm();
-    clearance.turn += angle_between(before, now);
+    clearance.turn += angle;
     LastLook& last = context.work().last_looks[p];
     last.way_of_near += farthest_way(last.near, before, now);
-    last.way_of_all += farthest_way(context.world.pieces[p].surface.bounds, before, now);
+    last.way_of_all += farthest_way(piece.surface.bounds, before, now);
   }
 }
 

@@ -143,8 +143,8 @@ void add_wall_region(const Organ& organ, OrganModel& model) {
   rest.enclosed.damping *= softer;
 }
 
-/// The vertices of a piece that may poke into a triangle of an organ: where it is curved more sharply than `radius` (m),
-/// and not inside another piece of the same instrument, which keeps the organ away from there.
+/// The vertices of a piece that may poke into a triangle of an organ: where it is curved more sharply than `radius`
+/// (m), and not inside another piece of the same instrument, which keeps the organ away from there.
 std::vector<int> poking_vertices(const std::vector<InstrumentPiece>& pieces, const InstrumentPiece& piece,
                                  double radius) {
   std::vector<int> vertices = sharper_than(piece.surface, radius);

@@ -24,8 +24,15 @@ using QuadIndex = int __attribute__((vector_size(16)));
 #define TISSUE_SIM_SHUFFLE(a, b, ...) __builtin_shuffle(a, b, QuadIndex{__VA_ARGS__})
 #endif
 
+TISSUE_SIM_INLINE void join(const Quad& low, const Quad& high, Eight& both) {
+  both = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
+}
 TISSUE_SIM_INLINE void join(const Eight& low, const Eight& high, Sixteen& both) {
   both = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+}
+TISSUE_SIM_INLINE void part(const Eight& both, Quad& low, Quad& high) {
+  low = __builtin_shufflevector(both, both, 0, 1, 2, 3);
+  high = __builtin_shufflevector(both, both, 4, 5, 6, 7);
 }
 
 template <class Lane>
@@ -77,6 +84,34 @@ TISSUE_SIM_INLINE void from_rows(const float* rows, Quad& a, Quad& b, Quad& c, Q
   const Quad zw2 = TISSUE_SIM_SHUFFLE(z, zero, 2, 6, 3, 7);
   c = TISSUE_SIM_SHUFFLE(xy2, zw2, 0, 1, 4, 5);
   d = TISSUE_SIM_SHUFFLE(xy2, zw2, 2, 3, 6, 7);
+}
+
+/// The same of eight vectors: a and the fifth in one register, b and the sixth, c and the seventh, d and the eighth.
+template <std::size_t stride>
+TISSUE_SIM_INLINE void to_rows(const Eight& a, const Eight& b, const Eight& c, const Eight& d, float* rows) {
+  const Eight ab = __builtin_shufflevector(a, b, 0, 8, 1, 9, 4, 12, 5, 13);
+  const Eight cd = __builtin_shufflevector(c, d, 0, 8, 1, 9, 4, 12, 5, 13);
+  lane<Eight>(rows) = __builtin_shufflevector(ab, cd, 0, 1, 8, 9, 4, 5, 12, 13);
+  lane<Eight>(rows + stride) = __builtin_shufflevector(ab, cd, 2, 3, 10, 11, 6, 7, 14, 15);
+  const Eight abz = __builtin_shufflevector(a, b, 2, 10, 3, 11, 6, 14, 7, 15);
+  const Eight cdz = __builtin_shufflevector(c, d, 2, 10, 3, 11, 6, 14, 7, 15);
+  lane<Eight>(rows + 2 * stride) = __builtin_shufflevector(abz, cdz, 0, 1, 8, 9, 4, 5, 12, 13);
+}
+
+template <std::size_t stride>
+TISSUE_SIM_INLINE void from_rows(const float* rows, Eight& a, Eight& b, Eight& c, Eight& d) {
+  const Eight& x = lane<Eight>(rows);
+  const Eight& y = lane<Eight>(rows + stride);
+  const Eight& z = lane<Eight>(rows + 2 * stride);
+  const Eight zero{};
+  const Eight xy = __builtin_shufflevector(x, y, 0, 8, 1, 9, 4, 12, 5, 13);
+  const Eight zw = __builtin_shufflevector(z, zero, 0, 8, 1, 9, 4, 12, 5, 13);
+  a = __builtin_shufflevector(xy, zw, 0, 1, 8, 9, 4, 5, 12, 13);
+  b = __builtin_shufflevector(xy, zw, 2, 3, 10, 11, 6, 7, 14, 15);
+  const Eight xy2 = __builtin_shufflevector(x, y, 2, 10, 3, 11, 6, 14, 7, 15);
+  const Eight zw2 = __builtin_shufflevector(z, zero, 2, 10, 3, 11, 6, 14, 7, 15);
+  c = __builtin_shufflevector(xy2, zw2, 0, 1, 8, 9, 4, 5, 12, 13);
+  d = __builtin_shufflevector(xy2, zw2, 2, 3, 10, 11, 6, 7, 14, 15);
 }
 
 template <class Lane>

@@ -65,6 +65,47 @@ TISSUE_SIM_INLINE void scatter(const NeoHookeanBatch& batch, std::size_t count, 
   }
 }
 
+/// As above, with eight lanes: two tetrahedra in a register, l and l + 4.
+TISSUE_SIM_INLINE void edges_of_two(const NeoHookeanBatch& batch, std::size_t l, const float* displacements, Eight& e1,
+                                    Eight& e2, Eight& e3) {
+  const auto corner_of_two = [&](std::size_t i, Eight & corner) __attribute__((always_inline)) {
+    const auto& vertices = batch.vertices[i];
+    join(quad(at(displacements, vertices[l])), quad(at(displacements, vertices[l + 4])), corner);
+  };
+  Eight origin;
+  corner_of_two(0, origin);
+  corner_of_two(1, e1);
+  corner_of_two(2, e2);
+  corner_of_two(3, e3);
+  e1 -= origin;
+  e2 -= origin;
+  e3 -= origin;
+}
+
+TISSUE_SIM_INLINE void gather_eight(const NeoHookeanBatch& batch, const float* displacements, float* rows) {
+  Eight a1, a2, a3, b1, b2, b3, c1, c2, c3, d1, d2, d3;
+  edges_of_two(batch, 0, displacements, a1, a2, a3);
+  edges_of_two(batch, 1, displacements, b1, b2, b3);
+  edges_of_two(batch, 2, displacements, c1, c2, c3);
+  edges_of_two(batch, 3, displacements, d1, d2, d3);
+  to_rows<stride>(a1, b1, c1, d1, rows);
+  to_rows<stride>(a2, b2, c2, d2, rows + 3 * stride);
+  to_rows<stride>(a3, b3, c3, d3, rows + 6 * stride);
+}
+
+TISSUE_SIM_INLINE void scatter_eight(const NeoHookeanBatch& batch, std::size_t count, const float* rows,
+                                     float* forces) {
+  if (count < lanes) return scatter(batch, count, rows, forces);
+  Eight p[3][4];
+  for (std::size_t i = 0; i < 3; ++i) from_rows<stride>(rows + 3 * i * stride, p[i][0], p[i][1], p[i][2], p[i][3]);
+  Quad low[3][4], high[3][4];
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t l = 0; l < 4; ++l) part(p[i][l], low[i][l], high[i][l]);
+  }
+  for (std::size_t l = 0; l < 4; ++l) subtract(batch, l, low[0][l], low[1][l], low[2][l], forces);
+  for (std::size_t l = 0; l < 4; ++l) subtract(batch, l + 4, high[0][l], high[1][l], high[2][l], forces);
+}
+
 /// a p + b q + c r, left to right.
 template <class Lane>
 TISSUE_SIM_INLINE void combine(const Lane& a, const Three<Lane>& p, const Lane& b, const Three<Lane>& q, const Lane& c,
@@ -98,7 +139,8 @@ TISSUE_SIM_INLINE void load(const NeoHookeanBatch& batch, std::size_t l, Constan
 }
 
 /// Of all lanes of two batches.
-TISSUE_SIM_INLINE void load_two(const NeoHookeanBatch& low, const NeoHookeanBatch& high, Constants<Sixteen>& constants) {
+TISSUE_SIM_INLINE void load_two(const NeoHookeanBatch& low, const NeoHookeanBatch& high,
+                                Constants<Sixteen>& constants) {
   for (std::size_t i = 0; i < 9; ++i) {
     join(lane<Eight>(low.inverse_rest[i].data()), lane<Eight>(high.inverse_rest[i].data()), constants.inverse_rest[i]);
   }
@@ -153,11 +195,13 @@ struct ListedBatches {
 /// How a few batches, side by side in rows of edges, are computed: each by itself, or two in one register.
 template <class Lane>
 struct OneByOne {
+  static constexpr bool eight = sizeof(Lane) >= sizeof(Eight);  ///< lanes are gathered and scattered at once
   TISSUE_SIM_INLINE static void pull_all(const NeoHookeanBatch* const* batches, std::size_t count, float* rows) {
     for (std::size_t b = 0; b < count; ++b) pull_in_parts<Lane>(*batches[b], rows + lanes * b);
   }
 };
 struct TwoByTwo {
+  static constexpr bool eight = true;
   TISSUE_SIM_INLINE static void pull_all(const NeoHookeanBatch* const* batches, std::size_t count, float* rows) {
     std::size_t b = 0;
     for (; b + 1 < count; b += 2) {
@@ -181,11 +225,15 @@ TISSUE_SIM_INLINE void add_forces(const NeoHookeanSolid& solid, const Chosen& ch
   for (std::size_t first = 0; first < chosen.count; first += block) {
     const std::size_t count = std::min(block, chosen.count - first);
     for (std::size_t b = 0; b < count; ++b) batches[b] = &solid.batches[chosen[first + b]];
-    for (std::size_t b = 0; b < count; ++b) gather(*batches[b], displacements, rows + lanes * b);
+    for (std::size_t b = 0; b < count; ++b) {
+      Few::eight ? gather_eight(*batches[b], displacements, rows + lanes * b)
+                 : gather(*batches[b], displacements, rows + lanes * b);
+    }
     Few::pull_all(batches, count, rows);
     for (std::size_t b = 0; b < count; ++b) {
       const std::size_t tetrahedra = std::min(lanes, solid.tetrahedra - lanes * chosen[first + b]);
-      scatter(*batches[b], tetrahedra, rows + lanes * b, forces);
+      Few::eight ? scatter_eight(*batches[b], tetrahedra, rows + lanes * b, forces)
+                 : scatter(*batches[b], tetrahedra, rows + lanes * b, forces);
     }
   }
 }

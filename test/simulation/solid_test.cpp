@@ -356,5 +356,49 @@ TEST(Solid, ContactsGoAlongWithTheInstrument) {
   }
 }
 
+/// A ball with a shaft on it, pressed in, that leans over by `lean` (rad) in the last step.
+Simulation leaning(double lean) {
+  Instrument tool = ball(radius);
+  TriangleMesh shaft = make_cylinder(0.5 * radius, 0.3, 12);
+  for (Vector3& v : shaft.vertices) v.z() += 0.17 + radius;
+  tool.parts.push_back({"shaft", shaft, true});
+  Simulation simulation(scene_of(soft_block(Model::fem, 6, Integrator::explicit_substeps), {tool}));
+  simulation.start_at(ball_over_block(radius, -1e-4));
+  simulation.slide_to(ball_over_block(radius, depth), 100);
+  Pose pose = simulation.poses[0];
+  pose.orientation = turn(lean, Vector3::UnitX()) * pose.orientation;
+  simulation.go_to(pose);
+  EXPECT_GE(simulation.report.substeps, 3);
+  return simulation;
+}
+
+/// The far end of a shaft swings where no organ is: contact is not looked for again before it can have come near.
+TEST(Solid, WhatSwingsFarFromTheOrganIsNotLookedAtAgain) {
+  const double limit = leaning(0.0).world.organs[0].motion_limit;
+  const double to_the_end = 0.32 + radius;
+  const auto way_since = [&](double way_of_end) {
+    return leaning(way_of_end / to_the_end).workspace.organs[0].last_looks[1].way_of_all;
+  };
+  EXPECT_GT(way_since(1.2 * limit), 0.7 * limit) << "it was looked for again after half a limit";
+  EXPECT_LT(way_since(6.0 * limit), 2.0 * limit) << "it may have come near";
+}
+
+/// The end of a probe is a ball of which one half is in its shaft: no organ gets there.
+TEST(Solid, WhatIsInsideAnotherPieceOfItsInstrumentDoesNotPoke) {
+  Instrument probe = ball(radius);
+  TriangleMesh shaft = make_cylinder(1.2 * radius, 0.1, 24);
+  for (Vector3& v : shaft.vertices) v.z() += 0.05;
+  probe.parts.push_back({"shaft", shaft, true});
+  Scene scene = scene_of(soft_block(Model::fem, 6), {probe, ball(radius, "another")});
+  const World world = build_world(scene);
+  ASSERT_EQ(world.pieces.size(), 3u);
+  const std::vector<std::vector<int>>& poking = world.organs[0].poking;
+  std::size_t outside = 0;
+  for (const Vector3& v : world.pieces[0].surface.vertices) outside += v.z() < poke_reach ? 1 : 0;
+  EXPECT_EQ(poking[0].size(), outside);
+  for (const int v : poking[0]) EXPECT_LT(world.pieces[0].surface.vertices[v].z(), poke_reach);
+  EXPECT_EQ(poking[2].size(), world.pieces[2].surface.vertices.size()) << "another instrument, which may be elsewhere";
+}
+
 }  // namespace
 }  // namespace tissue_sim::solid_test

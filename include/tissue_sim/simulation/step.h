@@ -46,7 +46,7 @@ struct OrganWorkspace {
   std::vector<int> bearers;  ///< of the points, ascending
   ElementRoom elements;
   LevelsRoom levels;
-  ResponseRoom response;  ///< of the points
+  ResponseRoom response;         ///< of the points
   std::vector<int> pressing_of;  ///< per place, into the state's pressing; -1 between two uses
   DescentRoom descent;
   OrganState last_good;
