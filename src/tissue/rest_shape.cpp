@@ -167,8 +167,10 @@ RestShape build_rest_shape(const Organ& organ) {
     shape.fastest_frequency = fastest_frequency(shape);
     // Stiffness-proportional: what moves at the fastest frequency is damped by the ratio, slower motion by less.
     if (!shape.tetrahedra.empty()) shape.damping_time = 2.0 * organ.material.damping / shape.fastest_frequency;
-    shape.stable_substep = stable_substep(shape, is_solid(organ.model) ? solid_safety : surface_safety,
-                                          organ.model == Model::fem ? solid_safety : surface_safety);
+    const double safety = organ.model == Model::fem      ? solid_safety
+                          : organ.model == Model::volume ? volume_safety
+                                                         : surface_safety;
+    shape.stable_substep = stable_substep(shape, safety, organ.model == Model::fem ? solid_safety : surface_safety);
     shape.stiffest_element = stiffest_element(shape, shape.positions);
   }
   return shape;
