@@ -14,8 +14,8 @@ namespace {
 constexpr int most_rounds = 16;
 constexpr double tolerance = 1e-5;  ///< of the largest impulse
 
-/// Points that share vertices with one point: usually there are no more.
-constexpr std::size_t usual_sharing = 32;
+/// Points that share vertices with one point, in the mean: usually there are no more.
+constexpr std::size_t usual_sharing = 64;
 
 }  // namespace
 

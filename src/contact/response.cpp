@@ -52,6 +52,7 @@ void solve(std::vector<ContactPoint>& points, double ContactPoint::*given, Respo
 void stop_at_instrument(std::vector<ContactPoint>& points, const std::vector<double>& inverse_mass,
                         const std::vector<Vector3>& positions, double dt, std::vector<Vector3>& velocities,
                         ResponseRoom& room) {
+  if (points.empty()) return;  // the matrix is that of points before
   room.lacking.clear();
   for (const ContactPoint& point : points) {
     const double ahead = std::max(0.0, point.direction.dot(at_point(point, positions)) - point.target);
@@ -69,6 +70,7 @@ void stop_at_instrument(std::vector<ContactPoint>& points, const std::vector<dou
 
 void bear_forces(const std::vector<double>& inverse_mass, const std::vector<Vector3>& forces,
                  std::vector<ContactPoint>& points, ResponseRoom& room) {
+  if (points.empty()) return;
   room.lacking.clear();
   for (const ContactPoint& point : points) {
     double away = 0.0;

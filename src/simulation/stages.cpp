@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <optional>
 
 #include "tissue_sim/contact/propagation.h"
 #include "tissue_sim/simulation/health.h"
@@ -78,7 +79,7 @@ Vector3 velocity_of(const Pose& before, const Pose& now, const Vector3& point, d
 }
 
 /// m. The farthest way of a point of a box in the tip's frame from one pose of the tip to the next: that of a corner,
-/// since it grows by the same from point to point. Small for a shaft that spins about itself.
+/// since a point's way is linear in the point. Small for a shaft that spins about itself.
 double farthest_way(const Box& box, const Pose& from, const Pose& to) {
   const Matrix3 turned = to.orientation.toRotationMatrix() - from.orientation.toRotationMatrix();
   const Vector3 moved = to.position - from.position;
@@ -89,16 +90,15 @@ double farthest_way(const Box& box, const Pose& from, const Pose& to) {
   return std::sqrt(farthest);
 }
 
-/// What of an instrument's piece lies in the organ's box grown by `margin`, in the tip's frame; the tip if nothing
-/// does.
-Box part_near(const StepContext& context, const InstrumentPiece& piece, double margin) {
+/// What of an instrument's piece lies in the organ's box grown by `margin` (m), in the tip's frame.
+std::optional<Box> part_near(const StepContext& context, const InstrumentPiece& piece, double margin) {
   const Pose& pose = context.workspace.now[piece.instrument];
   const Pose to_tip = {pose.apply_inverse(Vector3::Zero()), pose.orientation.conjugate()};
   const OrganWorkspace& work = context.workspace.organs[context.organ];
   const Box organ = scene_bounds(bounds_of(work.patches).grown(margin), to_tip);
   const Box& all = piece.surface.bounds;
-  if (!organ.overlaps(all)) return {Vector3::Zero(), Vector3::Zero()};
-  return {organ.lower.cwiseMax(all.lower), organ.upper.cwiseMin(all.upper)};
+  if (!organ.overlaps(all)) return std::nullopt;
+  return Box{organ.lower.cwiseMax(all.lower), organ.upper.cwiseMin(all.upper)};
 }
 
 /// Whether an instrument's piece and the organ can have moved against each other by more than goes unseen. What of the
@@ -427,7 +427,7 @@ void place_instruments(StepContext& context, int substep, int substeps) {
     clearance.shift += (now.position - before.position).norm();
     clearance.turn += angle;
     LastLook& last = context.work().last_looks[p];
-    last.way_of_near += farthest_way(last.near, before, now);
+    if (last.near) last.way_of_near += farthest_way(*last.near, before, now);
     last.way_of_all += farthest_way(piece.surface.bounds, before, now);
   }
 }
@@ -520,10 +520,10 @@ void find_contacts(StepContext& context) {
     const Pose& pose = context.workspace.now[piece.instrument];
     add_vertex_contacts(surface, piece.surface, index, pose, work.penetrations[p], work.detections[p],
                         context.state.touching[p], work.points);
-    const std::vector<int>& poking = context.model().poking[p];
-    if (poking.empty()) continue;  // nowhere thinner than the organ's mesh: its vertices feel all of it
+    if (context.model().sharp[p] == 0) continue;  // the organ's vertices feel all of it
     add_edge_contacts(surface, piece.surface, index, pose, work.detections[p], work.points);
-    add_poke_contacts(surface, piece.surface, index, pose, poking, context.state.clearances[p], work.points);
+    add_poke_contacts(surface, piece.surface, index, pose, context.model().poking[p], context.state.clearances[p],
+                      work.points);
   }
   const bool parts = !context.model().regions.empty();
   if (parts && !context.state.asleep && context.substep == 1)

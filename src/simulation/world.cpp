@@ -186,7 +186,9 @@ World build_world(const Scene& scene) {
     model.motion_limit = std::max(std::min(edge_fraction * model.rest.mean_edge, thickness_fraction * thinnest),
                                   0.01 * model.rest.mean_edge);
     for (const InstrumentPiece& piece : world.pieces) {
-      model.poking.push_back(poking_vertices(world.pieces, piece, sharp * model.rest.mean_edge));
+      const double radius = sharp * model.rest.mean_edge;
+      model.sharp.push_back(sharper_than(piece.surface, radius).empty() ? 0 : 1);
+      model.poking.push_back(poking_vertices(world.pieces, piece, radius));
     }
     choose_integrator(scene, organ, model);
     if (model.integrator == Integrator::vertex_block_descent) {

@@ -80,9 +80,9 @@ class Simulation {
   Simulation(const StudyCase& given, const StudyRun& run, double drag, bool at_vertices = false)
       : given_(given), time_step_(run.time_step), world_(build_world(scene_of(given, run, drag))) {
     world_.organs[0].rest.stable_substep /= run.finer;
-    for (std::vector<int>& vertices : world_.organs[0].poking) {
-      if (at_vertices) vertices.clear();
-      pokes_ = pokes_ || !vertices.empty();
+    for (char& sharp : world_.organs[0].sharp) {
+      if (at_vertices) sharp = 0;
+      pokes_ = pokes_ || sharp != 0;
     }
     state_ = rest_state(world_);
     workspace_ = build_workspace(world_);

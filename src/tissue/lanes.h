@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstring>
 
 #define TISSUE_SIM_INLINE __attribute__((always_inline)) inline
 
@@ -19,11 +20,16 @@ static_assert(alignof(Quad) == alignof(float), "vectors are read from and writte
 
 #if defined(__clang__)
 #define TISSUE_SIM_SHUFFLE(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
+#define TISSUE_SIM_SHUFFLE_EIGHT(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
 #else
 using QuadIndex = int __attribute__((vector_size(16)));
+using EightIndex = int __attribute__((vector_size(32)));
 #define TISSUE_SIM_SHUFFLE(a, b, ...) __builtin_shuffle(a, b, QuadIndex{__VA_ARGS__})
+#define TISSUE_SIM_SHUFFLE_EIGHT(a, b, ...) __builtin_shuffle(a, b, EightIndex{__VA_ARGS__})
 #endif
 
+// Halves put together, and taken apart. g++ before 12 has no word for it but memory.
+#if defined(__clang__) || __GNUC__ >= 12
 TISSUE_SIM_INLINE void join(const Quad& low, const Quad& high, Eight& both) {
   both = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
 }
@@ -34,6 +40,17 @@ TISSUE_SIM_INLINE void part(const Eight& both, Quad& low, Quad& high) {
   low = __builtin_shufflevector(both, both, 0, 1, 2, 3);
   high = __builtin_shufflevector(both, both, 4, 5, 6, 7);
 }
+#else
+template <class Half, class Whole>
+TISSUE_SIM_INLINE void join(const Half& low, const Half& high, Whole& both) {
+  std::memcpy(&both, &low, sizeof(low));
+  std::memcpy(reinterpret_cast<char*>(&both) + sizeof(low), &high, sizeof(high));
+}
+TISSUE_SIM_INLINE void part(const Eight& both, Quad& low, Quad& high) {
+  std::memcpy(&low, &both, sizeof(low));
+  std::memcpy(&high, reinterpret_cast<const char*>(&both) + sizeof(low), sizeof(high));
+}
+#endif
 
 template <class Lane>
 struct Three {
@@ -89,13 +106,13 @@ TISSUE_SIM_INLINE void from_rows(const float* rows, Quad& a, Quad& b, Quad& c, Q
 /// The same of eight vectors: a and the fifth in one register, b and the sixth, c and the seventh, d and the eighth.
 template <std::size_t stride>
 TISSUE_SIM_INLINE void to_rows(const Eight& a, const Eight& b, const Eight& c, const Eight& d, float* rows) {
-  const Eight ab = __builtin_shufflevector(a, b, 0, 8, 1, 9, 4, 12, 5, 13);
-  const Eight cd = __builtin_shufflevector(c, d, 0, 8, 1, 9, 4, 12, 5, 13);
-  lane<Eight>(rows) = __builtin_shufflevector(ab, cd, 0, 1, 8, 9, 4, 5, 12, 13);
-  lane<Eight>(rows + stride) = __builtin_shufflevector(ab, cd, 2, 3, 10, 11, 6, 7, 14, 15);
-  const Eight abz = __builtin_shufflevector(a, b, 2, 10, 3, 11, 6, 14, 7, 15);
-  const Eight cdz = __builtin_shufflevector(c, d, 2, 10, 3, 11, 6, 14, 7, 15);
-  lane<Eight>(rows + 2 * stride) = __builtin_shufflevector(abz, cdz, 0, 1, 8, 9, 4, 5, 12, 13);
+  const Eight ab = TISSUE_SIM_SHUFFLE_EIGHT(a, b, 0, 8, 1, 9, 4, 12, 5, 13);
+  const Eight cd = TISSUE_SIM_SHUFFLE_EIGHT(c, d, 0, 8, 1, 9, 4, 12, 5, 13);
+  lane<Eight>(rows) = TISSUE_SIM_SHUFFLE_EIGHT(ab, cd, 0, 1, 8, 9, 4, 5, 12, 13);
+  lane<Eight>(rows + stride) = TISSUE_SIM_SHUFFLE_EIGHT(ab, cd, 2, 3, 10, 11, 6, 7, 14, 15);
+  const Eight abz = TISSUE_SIM_SHUFFLE_EIGHT(a, b, 2, 10, 3, 11, 6, 14, 7, 15);
+  const Eight cdz = TISSUE_SIM_SHUFFLE_EIGHT(c, d, 2, 10, 3, 11, 6, 14, 7, 15);
+  lane<Eight>(rows + 2 * stride) = TISSUE_SIM_SHUFFLE_EIGHT(abz, cdz, 0, 1, 8, 9, 4, 5, 12, 13);
 }
 
 template <std::size_t stride>
@@ -104,14 +121,14 @@ TISSUE_SIM_INLINE void from_rows(const float* rows, Eight& a, Eight& b, Eight& c
   const Eight& y = lane<Eight>(rows + stride);
   const Eight& z = lane<Eight>(rows + 2 * stride);
   const Eight zero{};
-  const Eight xy = __builtin_shufflevector(x, y, 0, 8, 1, 9, 4, 12, 5, 13);
-  const Eight zw = __builtin_shufflevector(z, zero, 0, 8, 1, 9, 4, 12, 5, 13);
-  a = __builtin_shufflevector(xy, zw, 0, 1, 8, 9, 4, 5, 12, 13);
-  b = __builtin_shufflevector(xy, zw, 2, 3, 10, 11, 6, 7, 14, 15);
-  const Eight xy2 = __builtin_shufflevector(x, y, 2, 10, 3, 11, 6, 14, 7, 15);
-  const Eight zw2 = __builtin_shufflevector(z, zero, 2, 10, 3, 11, 6, 14, 7, 15);
-  c = __builtin_shufflevector(xy2, zw2, 0, 1, 8, 9, 4, 5, 12, 13);
-  d = __builtin_shufflevector(xy2, zw2, 2, 3, 10, 11, 6, 7, 14, 15);
+  const Eight xy = TISSUE_SIM_SHUFFLE_EIGHT(x, y, 0, 8, 1, 9, 4, 12, 5, 13);
+  const Eight zw = TISSUE_SIM_SHUFFLE_EIGHT(z, zero, 0, 8, 1, 9, 4, 12, 5, 13);
+  a = TISSUE_SIM_SHUFFLE_EIGHT(xy, zw, 0, 1, 8, 9, 4, 5, 12, 13);
+  b = TISSUE_SIM_SHUFFLE_EIGHT(xy, zw, 2, 3, 10, 11, 6, 7, 14, 15);
+  const Eight xy2 = TISSUE_SIM_SHUFFLE_EIGHT(x, y, 2, 10, 3, 11, 6, 14, 7, 15);
+  const Eight zw2 = TISSUE_SIM_SHUFFLE_EIGHT(z, zero, 2, 10, 3, 11, 6, 14, 7, 15);
+  c = TISSUE_SIM_SHUFFLE_EIGHT(xy2, zw2, 0, 1, 8, 9, 4, 5, 12, 13);
+  d = TISSUE_SIM_SHUFFLE_EIGHT(xy2, zw2, 2, 3, 10, 11, 6, 7, 14, 15);
 }
 
 template <class Lane>

@@ -220,6 +220,23 @@ TEST(StopAtInstrument, AGapMayBeClosedButNotPassed) {
   EXPECT_NEAR(at_point(points[0], v).z(), 0.0, 1e-12);
 }
 
+/// Once the instrument has left: the room is still that of the points before.
+TEST(StopAtInstrument, WithoutPointsNothingHappens) {
+  const std::vector<double> inverse_mass(3, 1.0);
+  std::vector<ContactPoint> points = {point_at({0, 1, 2}, {0.2, 0.3, 0.5}, Vector3::UnitZ(), 0.0)};
+  ResponseRoom room;
+  room.delassus.build(points, inverse_mass);
+  std::vector<Vector3> v(3, Vector3(0, 0, -1));
+  tissue_sim::stop_at_instrument(points, inverse_mass, corners, 0.001, v, room);
+  const std::vector<Vector3> stopped = v;
+  const std::vector<double> impulses = room.impulses;
+  points.clear();
+  tissue_sim::stop_at_instrument(points, inverse_mass, corners, 0.001, v, room);
+  bear_forces(inverse_mass, v, points, room);
+  EXPECT_EQ(v, stopped);
+  EXPECT_EQ(room.impulses, impulses);
+}
+
 /// A point that twelve vertices bear, as one of an embedded surface.
 ContactPoint widely_borne(Random& random, int first) {
   ContactPoint point;

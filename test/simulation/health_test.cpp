@@ -117,7 +117,7 @@ struct Injections {
     const double is = number;
     simulation.go_to(next, duration);
     ++made;
-    // Of what sleeps and of instruments far away a step looks at a thousand vertices.
+    // Of what sleeps and of instruments far away a step looks at a few hundred vertices.
     const std::size_t turns = (state().positions.size() + 255) / 256;
     for (std::size_t i = 1; i < turns && !simulation.report.recovered && !not_a_number(model(), state()).empty(); ++i) {
       simulation.go_to(next, duration);

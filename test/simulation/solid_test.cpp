@@ -400,5 +400,47 @@ TEST(Solid, WhatIsInsideAnotherPieceOfItsInstrumentDoesNotPoke) {
   EXPECT_EQ(poking[2].size(), world.pieces[2].surface.vertices.size()) << "another instrument, which may be elsewhere";
 }
 
+/// A thin rod whose ends are in two balls: none of its vertices can poke, and it lies across the organ all the same.
+TEST(Solid, ARodBetweenTwoBallsIsFeltByEdges) {
+  Instrument tool;
+  tool.name = "tool";
+  TriangleMesh rod = make_cylinder(0.0005, 0.04, 8);
+  for (Vector3& v : rod.vertices) v = {v.z(), v.y(), -v.x()};
+  tool.parts.push_back({"rod", rod, true});
+  for (const double end : {-0.02, 0.02}) {
+    TriangleMesh mesh = make_sphere(0.002, 8);
+    for (Vector3& v : mesh.vertices) v.x() += end;
+    tool.parts.push_back({"ball", mesh, true});
+  }
+  Organ organ = soft_block(Model::fem, 3, Integrator::explicit_substeps);
+  Simulation simulation(scene_of(organ, {tool}));
+  ASSERT_TRUE(simulation.world.organs[0].poking[0].empty());
+  EXPECT_EQ(simulation.world.organs[0].sharp[0], 1);
+  const auto at = [](double down) { return Pose{{0.0, 0.0017, 0.0005 - down}, Eigen::Quaterniond::Identity()}; };
+  simulation.start_at(at(-0.0005));
+  simulation.slide_to(at(0.001), 60);
+  int of_rod = 0;
+  for (const OrganContact& contact : simulation.report.contacts) of_rod += contact.part == 0 ? 1 : 0;
+  EXPECT_GT(of_rod, 0);
+}
+
+/// An instrument that moves far from the organ is no reason to look for the contacts of another one again.
+TEST(Solid, AnInstrumentFarAwayIsNotLookedAtAgain) {
+  Simulation simulation(
+      scene_of(soft_block(Model::fem, 6, Integrator::explicit_substeps), {ball(radius), ball(radius, "far")}));
+  simulation.start_at(ball_over_block(radius, -1e-4));
+  simulation.slide_to(ball_over_block(radius, depth), 100);
+  const double limit = simulation.world.organs[0].motion_limit;
+  const Pose here = simulation.poses[0];
+  const Pose from = {{0.0, 0.0, 0.5}, Eigen::Quaterniond::Identity()};
+  const Pose to = {{0.0, 0.9 * limit, 0.5}, Eigen::Quaterniond::Identity()};
+  const Motion motion = {0.001, {{true, here, here}, {true, from, to}}};
+  ++simulation.report.step;
+  step(simulation.world, motion, simulation.state, simulation.workspace, simulation.report);
+  ASSERT_GE(simulation.report.substeps, 3);
+  const double since = simulation.workspace.organs[0].last_looks[1].way_of_all;
+  EXPECT_GT(since, 0.9 * limit * (simulation.report.substeps - 1.5) / simulation.report.substeps);
+}
+
 }  // namespace
 }  // namespace tissue_sim::solid_test

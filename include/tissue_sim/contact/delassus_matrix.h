@@ -9,7 +9,7 @@ namespace tissue_sim {
 /// How much velocity along its direction a contact point gets from a unit of impulse at another: W = J M^-1 J^T, 1/kg,
 /// where row i of J makes of the velocities of the vertices that of point i along its direction (Delassus 1917). Points
 /// that share no vertex leave each other alone, so most of it is zero. It holds for as long as the points stay the same
-/// ones and keep their directions.
+/// ones, keep directions and bearers, and the vertices their masses.
 class DelassusMatrix {
  public:
   /// Makes room for as many points over as many vertices.
@@ -21,8 +21,8 @@ class DelassusMatrix {
   std::size_t size() const { return effective_mass_.size(); }
 
   /// Non-negative impulses (N s; before the call a guess) that give each point what it is lacking along its direction
-  /// (m/s): projected Gauss-Seidel over the points in order until next to nothing changes. A point that cannot move
-  /// gets none. Forces (N) from accelerations (m/s^2) just as well.
+  /// (m/s): projected Gauss-Seidel over the points in order, until next to nothing changes or 16 rounds are over.
+  /// A point that cannot move gets none. Forces (N) from accelerations (m/s^2) just as well.
   void solve(const std::vector<double>& lacking, std::vector<double>& impulses) const;
 
  private:

@@ -13,7 +13,8 @@ namespace tissue_sim {
 double push_out(const std::vector<ContactPoint>& points, const std::vector<double>& inverse_mass,
                 std::vector<Vector3>& positions, std::vector<char>* held);
 
-/// What the two functions below need: the matrix of their points, to be built when those are others, and room.
+/// What the two functions below need: the matrix of exactly their points, to be built whenever those are others, and
+/// room. Without points neither does anything.
 struct ResponseRoom {
   DelassusMatrix delassus;
   std::vector<double> lacking;

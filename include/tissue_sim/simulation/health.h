@@ -17,7 +17,7 @@ bool remembers_numbers(const OrganState& state);
 /// The same of an instrument's `vertices`.
 bool remembers_numbers(const Clearance& clearance, const std::vector<int>& vertices);
 
-/// Of all that there is for every vertex, asleep or not, used or not: finite numbers. Looks at a few thousand vertices
+/// Of all that there is for every vertex, asleep or not, used or not: finite numbers. Looks at some hundred vertices
 /// a `turn`: at all of a small organ, at others of a large one when the turn is another.
 bool healthy_in_turn(const OrganModel& model, const OrganState& state, std::uint64_t turn);
 

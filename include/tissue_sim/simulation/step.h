@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "tissue_sim/contact/response.h"
@@ -26,16 +27,16 @@ struct Motion {
   bool forces_wanted = true;  ///< false: contacts and wrenches carry none; nothing else differs
 };
 
-/// Room for one organ's step. Holds nothing that changes what the next step does: how far the boxes of its patches
-/// have been outrun saves work only.
 /// How far an instrument's piece and the organ may have gone since contact was last looked for.
 struct LastLook {
-  double travel = 0.0;                            ///< m, of the organ's patches then
-  Box near = {Vector3::Zero(), Vector3::Zero()};  ///< of the piece what was near the organ then; in the tip's frame
-  double way_of_near = 0.0;                       ///< m, since then
+  double travel = 0.0;       ///< m, of the organ's patches then
+  std::optional<Box> near;   ///< in the tip's frame: what of the piece was near the organ then
+  double way_of_near = 0.0;  ///< m, since then
   double way_of_all = 0.0;
 };
 
+/// Room for one organ's step. Holds nothing that changes what the next step does: how far the boxes of its patches
+/// have been outrun saves work only.
 struct OrganWorkspace {
   SurfacePatches patches;                 ///< of the organ's surface
   std::vector<Detection> detections;      ///< per piece

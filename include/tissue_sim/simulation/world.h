@@ -36,6 +36,7 @@ struct OrganModel {
   std::vector<RegionModel> regions;  ///< of the organ's own tetrahedra and of each level but the coarsest; of a wall
   double fine_edge = 0.0;            ///< m, of the organ's own tetrahedra
   double shear_modulus = 0.0;        ///< Pa
+  std::vector<char> sharp;           ///< per piece: somewhere curved more sharply than this organ's mesh can feel
   std::vector<std::vector<int>> poking;  ///< per piece: its vertices that may poke into a triangle of this organ
   double motion_limit = 0.0;             ///< m, the farthest an instrument may move between two contact passes
 };
