@@ -143,11 +143,10 @@ void add_wall_region(const Organ& organ, OrganModel& model) {
   rest.enclosed.damping *= softer;
 }
 
-/// The vertices of a piece that may poke into a triangle of an organ: where it is curved more sharply than `radius`
-/// (m), and not inside another piece of the same instrument, which keeps the organ away from there.
-std::vector<int> poking_vertices(const std::vector<InstrumentPiece>& pieces, const InstrumentPiece& piece,
-                                 double radius) {
-  std::vector<int> vertices = sharper_than(piece.surface, radius);
+/// Of vertices of a piece those that may poke into a triangle of an organ: not inside another piece of the same
+/// instrument, which keeps the organ away from there.
+std::vector<int> outside_others(const std::vector<InstrumentPiece>& pieces, const InstrumentPiece& piece,
+                                std::vector<int> vertices) {
   for (const InstrumentPiece& other : pieces) {
     if (&other == &piece || other.instrument != piece.instrument || !other.surface.closed) continue;
     const auto inside = [&](int v) {
@@ -186,9 +185,9 @@ World build_world(const Scene& scene) {
     model.motion_limit = std::max(std::min(edge_fraction * model.rest.mean_edge, thickness_fraction * thinnest),
                                   0.01 * model.rest.mean_edge);
     for (const InstrumentPiece& piece : world.pieces) {
-      const double radius = sharp * model.rest.mean_edge;
-      model.sharp.push_back(sharper_than(piece.surface, radius).empty() ? 0 : 1);
-      model.poking.push_back(poking_vertices(world.pieces, piece, radius));
+      const std::vector<int> vertices = sharper_than(piece.surface, sharp * model.rest.mean_edge);
+      model.sharp.push_back(vertices.empty() ? 0 : 1);
+      model.poking.push_back(outside_others(world.pieces, piece, vertices));
     }
     choose_integrator(scene, organ, model);
     if (model.integrator == Integrator::vertex_block_descent) {
